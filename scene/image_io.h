@@ -1,0 +1,54 @@
+// The one door to OpenImageIO (and through it OpenEXR): images from and to files.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "scene/expected.h"
+#include "scene/image.h"
+
+namespace lumel {
+
+/// An image as stored in its file, without colour conversion; integers are scaled to 0..1.
+struct LoadedImage {
+  Image image;                                  // all channels of the file's first subimage, in file order
+  std::vector<std::string> channelNames;        // one per channel, e.g. "R", "G", "B", "A"
+  std::map<std::string, std::string> metadata;  // string, int and float attributes, as text
+  std::string format;                           // OpenImageIO's name: "png", "openexr", "jpeg", ...
+  int bitsPerChannel = 0;                       // 8, 16 or 32
+  bool isFloat = false;                         // half or float in the file
+  bool paletted = false;                        // indexed colours (expanded in `image`)
+};
+
+/// Reads any format that OpenImageIO knows. Errors: Input, naming the file.
+Expected<LoadedImage> readImage(const std::filesystem::path& file);
+
+/// The same from encoded bytes in memory (glTF images: PNG, JPEG, WebP, ...). `name` is for messages.
+Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std::string& name);
+
+enum class PixelFormat { U8, U16, Half, Float };
+
+struct WriteImageOptions {
+  PixelFormat format = PixelFormat::Float;      // U8 and U16 store clamp(value, 0, 1) rounded to nearest
+  std::vector<std::string> channelNames;        // empty: the format's default (R, G, B, A)
+  std::map<std::string, std::string> metadata;  // string attributes (EXR, TIFF; PNG as text)
+};
+
+/// Writes by the file's extension, to a temporary name beside it that is renamed when complete: a reader never sees
+/// half a file. Values are stored as they are (no colour conversion). Errors: Failed (cannot write), Usage (unknown
+/// extension or a value that the format cannot hold: a finite value beyond 65504 with Half, a NaN anywhere).
+Expected<void> writeImage(const std::filesystem::path& file, const Image& image, const WriteImageOptions& options = {});
+
+/// Encodes as PNG (8-bit) in memory, for embedding.
+Expected<std::vector<std::uint8_t>> encodePng(const Image& image);
+
+inline float srgbToLinear(float c) { return c <= 0.04045f ? c / 12.92f : std::pow((c + 0.055f) / 1.055f, 2.4f); }
+inline float linearToSrgb(float c) {
+  return c <= 0.0031308f ? 12.92f * c : 1.055f * std::pow(c, 1.0f / 2.4f) - 0.055f;
+}
+
+}  // namespace lumel

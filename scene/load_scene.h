@@ -1,0 +1,19 @@
+// Scene files to plain data: glTF 2.0 (.gltf, .glb) and OBJ + MTL.
+#pragma once
+
+#include <filesystem>
+
+#include "scene/expected.h"
+#include "scene/scene.h"
+
+namespace lumel {
+
+struct LoadOptions {
+  bool allowOutsidePaths = false;  // buffers and images outside the scene's folder
+};
+
+/// Loads by extension. Errors: Input, one line naming file and place ("level.gltf: accessors/12: ...").
+/// A missing or unreadable texture is a warning in Scene::report; a missing buffer is an error.
+Expected<Scene> loadScene(const std::filesystem::path& file, const LoadOptions& options = {});
+
+}  // namespace lumel

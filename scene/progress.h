@@ -1,0 +1,21 @@
+// How long work tells the outside that it advances, and learns that it should stop.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace lumel {
+
+/// Implemented by the command line (a bar with an ETA on a terminal); the base class is silent.
+/// begin and end come from one thread; advance and cancelled may be called from any thread.
+class Progress {
+ public:
+  virtual ~Progress() = default;
+  virtual void begin(std::string_view /*stage*/, std::uint64_t /*totalWork*/) {}
+  virtual void advance(std::uint64_t /*work*/) {}
+  virtual void end() {}
+  /// True once the user asked to stop; work in hand returns interrupted() at its next convenient point.
+  virtual bool cancelled() const { return false; }
+};
+
+}  // namespace lumel

@@ -1,0 +1,150 @@
+// The scene as plain data: what every other room works on. Units: metres, candela, lux, nits (DESIGN conventions:
+// no photometric factor anywhere, a lux in is a lux out). Right-handed, y up, as glTF.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "scene/image.h"
+#include "scene/math.h"
+
+namespace lumel {
+
+/// A triangle list. Every array but `indices` has one entry per vertex or is empty.
+struct Primitive {
+  std::string name;  // for messages: "mesh 'Wall' primitive 2"
+  std::vector<Vec3> positions;
+  std::vector<Vec3> normals;                // unit; always present after loading (flat where the file had none)
+  std::vector<Vec4> tangents;               // xyz unit, w = +-1: bitangent = w * cross(n, t); from the file or made
+                                            // from the normal map's UVs; empty where neither asks for them
+  std::vector<std::vector<Vec2>> uvSets;    // TEXCOORD_n; v runs down the image
+  std::vector<Vec4> colors;                 // COLOR_0, linear, alpha 1 where the file has RGB
+  std::vector<std::uint32_t> indices;       // three per triangle, counter-clockwise from the front
+  int material = 0;                         // into Scene::materials; always valid
+
+  std::size_t triangleCount() const { return indices.size() / 3; }
+};
+
+struct Mesh {
+  std::string name;
+  std::vector<Primitive> primitives;
+};
+
+/// From glTF extras.lumel of the node (or its mesh): {"scale": 2.0, "casts": false, "receives": false}.
+struct ObjectSettings {
+  float texelDensityScale = 1.0f;  // multiplies the bake's texels per metre; > 0
+  bool casts = true;               // blocks and bounces light for others
+  bool receives = true;            // gets a lightmap
+};
+
+/// One placed mesh; the node tree (and EXT_mesh_gpu_instancing) is flattened into these, in file order.
+struct Instance {
+  std::string name;  // of the node; never empty, not always unique
+  int mesh = 0;
+  Mat4 worldFromObject{1.0f};  // may mirror (negative determinant)
+  ObjectSettings settings;
+};
+
+enum class Wrap { Repeat, Mirror, Clamp };
+
+/// Where and how a material reads an image. uv' = uvMatrix * (u, v, 1) (KHR_texture_transform).
+struct TextureRef {
+  int image = -1;  // into Scene::images; -1 = none
+  int uvSet = 0;
+  Mat3 uvMatrix{1.0f};
+  Wrap wrapU = Wrap::Repeat;
+  Wrap wrapV = Wrap::Repeat;
+  bool nearest = false;  // magnification filter NEAREST
+
+  explicit operator bool() const { return image >= 0; }
+};
+
+enum class AlphaMode { Opaque, Mask, Blend };
+
+/// Lambertian: diffuse albedo = baseColor * (1 - metallic). Metals keep their base colour as albedo only if the
+/// bake asks for it (game lightmaps have no specular transport).
+struct Material {
+  std::string name;
+  Vec4 baseColor{1, 1, 1, 1};  // linear factor; alpha in w
+  TextureRef baseColorMap;     // sRGB colour, linear alpha
+  float metallic = 0.0f;       // factor; the loader keeps what the file says (glTF default 1 becomes explicit)
+  TextureRef metallicMap;      // metallic in blue
+  TextureRef normalMap;        // tangent space, green up
+  float normalScale = 1.0f;
+  Vec3 emission{0, 0, 0};  // nits: emissiveFactor * emissiveStrength
+  TextureRef emissionMap;  // sRGB, times `emission`
+  AlphaMode alphaMode = AlphaMode::Opaque;
+  float alphaCutoff = 0.5f;
+  bool doubleSided = false;
+  bool unlit = false;  // KHR_materials_unlit: shown as it is, gets no lightmap, reflects as a diffuse surface
+};
+
+/// An image as the file holds it, decoded only when something needs its pixels (decodeTexture).
+struct ImageSource {
+  std::string name;                   // for messages: file name or "image 3"
+  std::string mimeType;               // "image/png", "image/jpeg", "image/webp", ... ; empty if unknown
+  std::vector<std::uint8_t> encoded;  // empty: missing (a warning was given; factors apply alone)
+};
+
+enum class LightType { Point, Spot, Directional };
+
+/// KHR_lights_punctual. Point and spot: intensity in candela (lm/sr); directional: lux on a facing surface.
+struct Light {
+  std::string name;
+  LightType type = LightType::Point;
+  Vec3 color{1, 1, 1};  // linear
+  float intensity = 1.0f;
+  Vec3 position{0, 0, 0};    // world
+  Vec3 direction{0, 0, -1};  // world, unit: where the light travels
+  float range = 0.0f;        // metres; 0 = unlimited; attenuation window as the extension recommends
+  float innerConeAngle = 0.0f;
+  float outerConeAngle = kPi / 4;
+};
+
+struct Camera {
+  std::string name;
+  Mat4 worldFromCamera{1.0f};  // looks along -z, y up
+  bool orthographic = false;
+  float yFov = 0.8f;     // radians; perspective
+  float aspect = 0.0f;   // width / height; 0 = that of the picture
+  float yExtent = 1.0f;  // half height in metres; orthographic
+};
+
+/// Light from infinity. Radiance = strength * (image or color). The image is equirectangular; with rotation 0,
+/// direction d reads u = 0.5 + atan2(d.z, d.x) / 2pi, v (from the top) = 0.5 - asin(d.y) / pi.
+struct Environment {
+  Vec3 color{0, 0, 0};
+  Image image;  // linear RGB; empty: `color` everywhere
+  float rotationDegrees = 0.0f;  // turns the sky about +y, counter-clockwise seen from above
+  float strength = 1.0f;
+
+  bool isBlack() const { return strength == 0.0f || (image.empty() && color == Vec3(0.0f)); }
+};
+
+/// What loading met that the user may want to know.
+struct LoadReport {
+  std::vector<std::string> warnings;  // one line each
+  std::size_t degenerateTriangles = 0;   // dropped: zero area or repeated vertices
+  std::size_t skippedPrimitives = 0;     // points and lines
+};
+
+struct Scene {
+  std::vector<Mesh> meshes;
+  std::vector<Instance> instances;
+  std::vector<Material> materials;  // at least one
+  std::vector<ImageSource> images;
+  std::vector<Light> lights;
+  std::vector<Camera> cameras;
+  Environment environment;  // set by the command line, not by the file
+  LoadReport report;
+
+  const Primitive& primitive(int mesh, int index) const {
+    return meshes[static_cast<std::size_t>(mesh)].primitives[static_cast<std::size_t>(index)];
+  }
+};
+
+}  // namespace lumel

@@ -1,0 +1,38 @@
+// Decoded textures and their lookup, shared by the bake and the compositor.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "scene/expected.h"
+#include "scene/scene.h"
+
+namespace lumel {
+
+enum class ColorSpace { Linear, Srgb };
+
+/// An image ready for lookup: 8-bit sources stay 8 bits, others become float. Missing channels read as in glTF
+/// (grey replicates, alpha 1).
+class Texture {
+ public:
+  /// `space` says how the colour channels (never alpha) are decoded to linear.
+  static Expected<Texture> decode(const ImageSource& source, ColorSpace space);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  std::size_t bytes() const { return bytes_.size() + floats_.size() * sizeof(float); }
+
+  /// Linear RGBA of texel (x, y), rows from the top; coordinates must be in range.
+  Vec4 fetch(int x, int y) const;
+  /// Bilinear (or nearest, as ref says) with wrap modes at ref.uvMatrix * uv; texel centres at (i + 0.5) / size.
+  Vec4 sample(const TextureRef& ref, Vec2 uv) const;
+
+ private:
+  int width_ = 0;
+  int height_ = 0;
+  ColorSpace space_ = ColorSpace::Linear;
+  std::vector<std::uint8_t> bytes_;  // RGBA
+  std::vector<float> floats_;        // RGBA, linear
+};
+
+}  // namespace lumel
