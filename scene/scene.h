@@ -65,14 +65,16 @@ struct TextureRef {
 
 enum class AlphaMode { Opaque, Mask, Blend };
 
-/// Lambertian: diffuse albedo = baseColor * (1 - metallic). Metals keep their base colour as albedo only if the
-/// bake asks for it (game lightmaps have no specular transport).
+/// Light transport is Lambertian with the base colour as albedo (a lightmap holds no specular light, and a metal
+/// whose diffuse part were black would leave a hole in the bounce light). Metallic and roughness are only carried
+/// through to scene.glb.
 struct Material {
   std::string name;
   Vec4 baseColor{1, 1, 1, 1};  // linear factor; alpha in w
   TextureRef baseColorMap;     // sRGB colour, linear alpha
-  float metallic = 0.0f;       // factor; the loader keeps what the file says (glTF default 1 becomes explicit)
-  TextureRef metallicMap;      // metallic in blue
+  float metallic = 0.0f;
+  float roughness = 1.0f;
+  TextureRef metallicRoughnessMap;
   TextureRef normalMap;        // tangent space, green up
   float normalScale = 1.0f;
   Vec3 emission{0, 0, 0};  // nits: emissiveFactor * emissiveStrength
