@@ -1,0 +1,16 @@
+// Lumel's own settings in a glTF file: "extras": {"lumel": {"scale": 2, "casts": false, "receives": true}}.
+// Private to scene/gltf_*.cpp.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "scene/gltf_document.h"
+#include "scene/scene.h"
+
+namespace lumel {
+
+/// Overwrites those settings that extras.lumel names. Returns what is wrong with it, if anything is.
+std::optional<std::string> readObjectSettings(const tinygltf::Value& extras, ObjectSettings& settings);
+
+}  // namespace lumel
