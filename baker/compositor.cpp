@@ -6,6 +6,7 @@
 
 #include "lightmap/projection.h"
 #include "scene/embree.h"
+#include "scene/environment.h"
 #include "scene/parallel.h"
 #include "scene/texture.h"
 
@@ -91,26 +92,6 @@ Vec2 pixelSample(int i) {
 }
 
 }  // namespace
-
-Vec3 skyRadiance(const Environment& sky, const Vec3& direction) {
-  if (sky.image.empty()) return sky.strength * sky.color;
-  const float angle = sky.rotationDegrees * kPi / 180.0f;
-  const Vec3 d(std::cos(angle) * direction.x - std::sin(angle) * direction.z, direction.y,
-               std::sin(angle) * direction.x + std::cos(angle) * direction.z);
-  const Image& image = sky.image;
-  const float u = 0.5f + std::atan2(d.z, d.x) / (2.0f * kPi);
-  const float v = 0.5f - std::asin(std::clamp(d.y, -1.0f, 1.0f)) / kPi;
-  const float x = u * static_cast<float>(image.width) - 0.5f;
-  const float y = std::clamp(v * static_cast<float>(image.height) - 0.5f, 0.0f, static_cast<float>(image.height - 1));
-  const int column = static_cast<int>(std::floor(x));
-  const int row = std::min(static_cast<int>(y), image.height - 1);
-  const int below = std::min(row + 1, image.height - 1);
-  const auto wrap = [&](int c) { return ((c % image.width) + image.width) % image.width; };
-  const float fx = x - static_cast<float>(column);
-  const float fy = y - static_cast<float>(row);
-  return sky.strength * glm::mix(glm::mix(image.rgb(wrap(column), row), image.rgb(wrap(column + 1), row), fx),
-                                 glm::mix(image.rgb(wrap(column), below), image.rgb(wrap(column + 1), below), fx), fy);
-}
 
 struct Compositor::Impl {
   explicit Impl(const BakedScene& scene) : baked(scene) {}
@@ -350,7 +331,7 @@ Vec3 Compositor::Impl::radiance(const Vec3& origin, const Vec3& direction, Rende
     tnear = query.ray.tfar * (1.0f + 1e-5f);
   }
   if (throughput > 1e-3f && mode == RenderMode::Lit)
-    sum += throughput * skyRadiance(baked.scene.environment, direction);
+    sum += throughput * environmentRadiance(baked.scene.environment, direction);
   return sum;
 }
 

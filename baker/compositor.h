@@ -66,7 +66,4 @@ class Compositor {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Radiance that arrives from a direction at infinity.
-Vec3 skyRadiance(const Environment& sky, const Vec3& direction);
-
 }  // namespace lumel
