@@ -5,11 +5,14 @@
 #include <queue>
 #include <unordered_map>
 
+#include "lightmap/chart_mesh.h"
+
 namespace lumel {
 namespace {
 
 constexpr double kThinTexels = 0.5;       // creases of triangles thinner than this fade out: no texel could show them
 constexpr double kSmoothCrease = 0.25;    // weight of a crease that is shaded smooth
+constexpr double kMostCrease = 1.2;       // however small: a little over a right angle
 constexpr double kShapeWeight = 0.002;    // against ragged borders: only decides between merges that are flat alike
 
 struct Region {
@@ -156,10 +159,11 @@ class Grower {
     const Vec3d extent = glm::max(a.high, b.high) - glm::min(a.low, b.low);
     constexpr double kNever = std::numeric_limits<double>::infinity();
     if (std::max({extent.x, extent.y, extent.z}) > options_.largestSide) return kNever;
+    const double slack = smallChartSlack(a.area + b.area);
     const double crease = border.crease / border.length;
-    if (crease > 1 - options_.maxCreaseCosine) return kNever;
+    if (crease > std::min(kMostCrease, (1 - options_.maxCreaseCosine) * slack)) return kNever;
     const double bend = coneVariance(a, b) / options_.maxConeVariance;
-    if (bend > 1) return kNever;
+    if (bend > slack) return kNever;
     const double perimeter = a.perimeter + b.perimeter - 2 * border.length;
     const double roundness = perimeter * perimeter / (4 * std::numbers::pi * (a.area + b.area));
     return bend + crease + kShapeWeight * roundness;

@@ -121,7 +121,7 @@ class PartMerger {
     std::vector<MeshEdge> matched;
     std::vector<MeshEdge> shared;
     for (const MeshEdge edge : border.edges) shared.push_back(sheet_.chartOf(edge.triangle) == into ? edge : sheet_.beyond(edge));
-    if (!sheet_.fit(shared, true, motion, matched)) return;
+    if (!sheet_.fit(shared, smallChartSlack(sheet_.chart(from).area), motion, matched)) return;
     double matchedLength = 0;
     for (const MeshEdge edge : matched) matchedLength += sheet_.length(edge);
     constexpr double kLeastMatch = 0.25;  // of the common border: half a pipe meets the other half along one of two

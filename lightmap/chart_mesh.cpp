@@ -99,6 +99,15 @@ Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, doubl
   return result;
 }
 
+double surfaceArea(const ChartMesh& chart) {
+  double area = 0;
+  for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
+    const FlatTriangle flat = layFlat(chart, t);
+    area += 0.5 * flat.x1 * flat.y2;
+  }
+  return area;
+}
+
 void scaleToSurface(const ChartMesh& chart, std::vector<Vec2d>& uvs) {
   double surface = 0, texture = 0;
   for (std::size_t t = 0; t < chart.triangles.size(); ++t) {

@@ -1,6 +1,7 @@
 // One chart as a mesh of its own, and what a flattening does to it. Lengths are in texels.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -34,7 +35,16 @@ struct Stretch {
   double badShare = 0.0;   // share of the surface where a singular value or its inverse exceeds the limit
   std::size_t flipped = 0; // triangles turned over by more than a float UV could lose
 };
+double surfaceArea(const ChartMesh& chart);
 Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, double limit);
+
+/// How much more bend and stretch a chart of this area (texels) may have than a large one, 1 .. 10: distortion that no
+/// texel can resolve matters less than a chart of its own with a gutter around it.
+inline double smallChartSlack(double area) {
+  constexpr double kFullSize = 16.0;
+  constexpr double kMost = 10.0;
+  return area >= kFullSize ? 1.0 : std::min(kMost, kFullSize / std::max(area, 1e-300));
+}
 
 /// Twice the signed area; positive where counter-clockwise with y up.
 inline double cross2(Vec2d a, Vec2d b) { return a.x * b.y - a.y * b.x; }

@@ -60,8 +60,8 @@ RigidMotion procrustes(const std::vector<std::array<Vec2d, 4>>& edges) {
   return motion;
 }
 
-bool matches(const std::array<Vec2d, 4>& e, const RigidMotion& motion) {
-  const double limit = std::min(kMatchTexels, kMatchShare * glm::length(e[1] - e[0]) + 1e-6);
+bool matches(const std::array<Vec2d, 4>& e, const RigidMotion& motion, double slack) {
+  const double limit = std::min(kMatchTexels, kMatchShare * slack * glm::length(e[1] - e[0]) + 1e-6);
   return glm::length(motion.apply(e[2]) - e[0]) <= limit && glm::length(motion.apply(e[3]) - e[1]) <= limit;
 }
 
@@ -165,13 +165,10 @@ void ChartSheet::insertBorder(Chart& chart, MeshEdge edge) {
   visitCells(a, b, [&](std::uint64_t key) { chart.border[key].push_back(edge); });
 }
 
-bool ChartSheet::fit(const std::vector<MeshEdge>& shared, bool givenFromInto, RigidMotion& motion, std::vector<MeshEdge>& matched) const {
+bool ChartSheet::fit(const std::vector<MeshEdge>& shared, double slack, RigidMotion& motion, std::vector<MeshEdge>& matched) const {
   std::vector<std::array<Vec2d, 4>> edges;  // ends in `into`, then the same ends in `from`
-  std::vector<MeshEdge> intoSide;
-  for (const MeshEdge given : shared) {
-    const MeshEdge into = givenFromInto ? given : beyond(given);
-    const MeshEdge from = givenFromInto ? beyond(given) : given;
-    intoSide.push_back(into);
+  for (const MeshEdge into : shared) {
+    const MeshEdge from = beyond(into);
     edges.push_back({uvs_[vertexAt(into.triangle, into.k)], uvs_[vertexAt(into.triangle, (into.k + 1) % 3)],
                      uvs_[vertexAt(from.triangle, (from.k + 1) % 3)], uvs_[vertexAt(from.triangle, from.k)]});
   }
@@ -192,9 +189,9 @@ bool ChartSheet::fit(const std::vector<MeshEdge>& shared, bool givenFromInto, Ri
       std::vector<MeshEdge> goodEdges;
       double total = 0;
       for (std::size_t i = 0; i < edges.size(); ++i) {
-        if (!matches(edges[i], trial)) continue;
+        if (!matches(edges[i], trial, slack)) continue;
         good.push_back(edges[i]);
-        goodEdges.push_back(intoSide[i]);
+        goodEdges.push_back(shared[i]);
         total += glm::length(edges[i][1] - edges[i][0]);
       }
       if (good.empty()) break;
@@ -237,7 +234,7 @@ bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const RigidMoti
     welded[vertexAt(other.triangle, (other.k + 1) % 3)] = uvs_[vertexAt(edge.triangle, edge.k)];
   }
   Vec2d low = target.low, high = target.high;
-  std::vector<std::uint32_t> seen;
+  const double maxStretch = options.maxStretch * std::sqrt(smallChartSlack(moved.area));
   for (const std::uint32_t t : moved.triangles) {
     std::array<Vec2d, 3> uv = corners(t);
     bool touched = false;
@@ -248,7 +245,7 @@ bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const RigidMoti
       low = glm::min(low, uv[k]);
       high = glm::max(high, uv[k]);
     }
-    if (touched && doubleArea(corners(t)) > 0 && !staysGood(t, uv, options.maxStretch)) return false;
+    if (touched && doubleArea(corners(t)) > 0 && !staysGood(t, uv, maxStretch)) return false;
     for (std::uint32_t k = 0; k < 3; ++k) {
       if (joined_[localTriangle_[t]][k]) continue;
       bool hit = false;

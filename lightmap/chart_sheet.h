@@ -37,9 +37,9 @@ class ChartSheet {
   std::uint32_t chartOf(std::uint32_t meshTriangle) const { return chartOf_[localTriangle_[meshTriangle]]; }
   MeshEdge beyond(MeshEdge edge) const;
 
-  /// How chart `from` must move so that its side of the shared edges (given from the side of `into`) meets them; fills
-  /// `matched` with the edges that do. False: none to speak of.
-  bool fit(const std::vector<MeshEdge>& shared, bool givenFromInto, RigidMotion& motion, std::vector<MeshEdge>& matched) const;
+  /// How a chart must move so that its side of the shared edges meets the other side, from which they are given; fills
+  /// `matched` with the edges that do meet. `slack` multiplies the tolerance. False: none meets.
+  bool fit(const std::vector<MeshEdge>& shared, double slack, RigidMotion& motion, std::vector<MeshEdge>& matched) const;
 
   /// Whether `from`, moved and welded at `matched`, keeps within the limits and lies on nothing of `into`.
   bool mayJoin(std::uint32_t into, std::uint32_t from, const RigidMotion& motion, const std::vector<MeshEdge>& matched,
