@@ -8,6 +8,7 @@
 
 #include "lightmap/chart_growing.h"
 #include "lightmap/chart_sheet.h"
+#include "lightmap/flatten.h"
 #include "scene/parallel.h"
 
 namespace lumel {
@@ -20,6 +21,7 @@ struct Border {
   std::uint32_t a = 0, b = 0;
   std::vector<MeshEdge> edges;  // from the side of either chart
   double length = 0, crease = 0;
+  double refusedArea = 0;  // of both charts together when flattening them as one failed
   bool alive = true;
 };
 
@@ -85,7 +87,7 @@ class PartMerger {
     if (d <= c) return;  // a cut inside a chart, or met from the other side
     const auto [place, isNew] = borderOf_.try_emplace(key(c, d), static_cast<std::uint32_t>(borders_.size()));
     if (isNew) {
-      borders_.push_back({c, d, {}, 0, 0, true});
+      borders_.push_back({c, d, {}, 0, 0, 0, true});
       bordersOf_[c].push_back(place->second);
       bordersOf_[d].push_back(place->second);
     }
@@ -106,9 +108,9 @@ class PartMerger {
   double cost(const Border& border) const {
     const ChartSheet::Chart& a = sheet_.chart(border.a);
     const ChartSheet::Chart& b = sheet_.chart(border.b);
-    const ChartSheet::Chart& smaller = a.area < b.area ? a : b;
+    const ChartSheet::Chart& smaller = a.normals.area < b.normals.area ? a : b;
     const double crease = border.crease / border.length;
-    if (crease > creaseLimit(smaller.area, smaller.perimeter)) return kNever;
+    if (crease > creaseLimit(smaller.normals.area, smaller.perimeter)) return kNever;
     return crease + 0.5 * std::max(0.0, 1 - 2 * border.length / smaller.perimeter);
   }
 
@@ -117,19 +119,50 @@ class PartMerger {
     std::uint32_t into = border.a;
     std::uint32_t from = border.b;
     if (sheet_.chart(into).triangles.size() < sheet_.chart(from).triangles.size()) std::swap(into, from);
-    RigidMotion motion;
-    std::vector<MeshEdge> matched;
     std::vector<MeshEdge> shared;
     for (const MeshEdge edge : border.edges) shared.push_back(sheet_.chartOf(edge.triangle) == into ? edge : sheet_.beyond(edge));
-    if (!sheet_.fit(shared, smallChartSlack(sheet_.chart(from).area), motion, matched)) return;
+    if (moveTo(border, into, from, shared) || flattenAsOne(border, into, from, shared)) merged(index, into, from);
+  }
+
+  /// Joins the charts as they are, by a rigid motion.
+  bool moveTo(const Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared) {
+    RigidMotion motion;
+    std::vector<MeshEdge> matched;
+    if (!sheet_.fit(shared, smallChartSlack(sheet_.chart(from).normals.area), motion, matched)) return false;
     double matchedLength = 0;
     for (const MeshEdge edge : matched) matchedLength += sheet_.length(edge);
     constexpr double kLeastMatch = 0.25;  // of the common border: half a pipe meets the other half along one of two
-    if (matchedLength < kLeastMatch * border.length || !sheet_.mayJoin(into, from, motion, matched, options_)) return;
+    if (matchedLength < kLeastMatch * border.length || !sheet_.mayJoin(into, from, motion, matched, options_)) return false;
     sheet_.join(into, from, motion, matched);
+    return true;
+  }
+
+  /// Flattens both anew as one chart: for curved surfaces, whose borders do not meet rigidly.
+  bool flattenAsOne(Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared) {
+    constexpr std::size_t kMostTriangles = 4000;   // keeps the number of flattenings times their cost near linear
+    constexpr double kMostConeVariance = 0.06;     // not worth the attempt
+    constexpr double kLeastBorder = 0.1;           // of the smaller one's perimeter: no chart with a narrow waist
+    constexpr double kGrowth = 1.3;                // since the last attempt
+    const ChartSheet::Chart& a = sheet_.chart(into);
+    const ChartSheet::Chart& b = sheet_.chart(from);
+    if (a.triangles.size() + b.triangles.size() > kMostTriangles) return false;
+    const NormalMoments both(a.normals, b.normals);
+    if (both.area < kGrowth * border.refusedArea || border.length < kLeastBorder * std::min(a.perimeter, b.perimeter)) return false;
+    border.refusedArea = both.area;
+    if (both.coneVariance() > kMostConeVariance * smallChartSlack(both.area)) return false;
+    FlatChart flat;
+    flat.mesh = sheet_.together(into, from, shared);
+    Flattening flattened = flatten(flat.mesh, {options_.maxStretch, options_.largestSide});
+    if (!flattened.valid) return false;
+    flat.uvs = std::move(flattened.uvs);
+    sheet_.replace(into, from, flat);
+    return true;
+  }
+
+  void merged(std::uint32_t index, std::uint32_t into, std::uint32_t from) {
     members_[into].insert(members_[into].end(), members_[from].begin(), members_[from].end());
     members_[from].clear();
-    border.alive = false;
+    borders_[index].alive = false;
     borderOf_.erase(key(into, from));
     for (const std::uint32_t moved : bordersOf_[from]) moveBorder(moved, from, into);
     bordersOf_[from].clear();

@@ -22,6 +22,9 @@ struct ChartMesh {
 /// `triangles`: ascending, of `mesh`; connected over its neighbours.
 ChartMesh makeChartMesh(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> triangles);
 
+/// Sets `triangles` and `points` from `meshTriangles` and `neighbours`: corners that meet over a joined edge are one point.
+void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart);
+
 /// A triangle laid into the plane without distortion: corner 0 at the origin, corner 1 on the x axis, corner 2 above.
 struct FlatTriangle {
   double x1 = 0, x2 = 0, y2 = 0;

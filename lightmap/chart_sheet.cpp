@@ -78,43 +78,46 @@ ChartSheet::ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& 
   double borderLength = 0;
   std::size_t borderEdges = 0;
   for (std::uint32_t c = 0; c < charts.size(); ++c) {
-    const FlatChart& flat = *charts[c];
-    Chart& chart = charts_[c];
-    const auto base = static_cast<std::uint32_t>(uvs_.size());
-    uvs_.insert(uvs_.end(), flat.uvs.begin(), flat.uvs.end());
-    for (std::uint32_t i = 0; i < flat.uvs.size(); ++i) chart.vertices.push_back(base + i);
-    chart.triangles = flat.mesh.meshTriangles;
-    chart.low = chart.high = flat.uvs[0];
-    for (const Vec2d uv : flat.uvs) {
-      chart.low = glm::min(chart.low, uv);
-      chart.high = glm::max(chart.high, uv);
-    }
-    for (std::size_t t = 0; t < flat.mesh.triangles.size(); ++t) {
-      const std::uint32_t local = localTriangle_[flat.mesh.meshTriangles[t]];
-      chartOf_[local] = c;
-      for (std::size_t k = 0; k < 3; ++k) {
-        cornerVertex_[local][k] = base + flat.mesh.triangles[t][k];
-        joined_[local][k] = flat.mesh.neighbours[t][k] >= 0;
-      }
-      const FlatTriangle laid = layFlat(flat.mesh, t);
-      chart.area += 0.5 * laid.x1 * laid.y2;
-      for (std::uint32_t k = 0; k < 3; ++k) {
-        if (joined_[local][k]) continue;
-        const double edge = length({flat.mesh.meshTriangles[t], k});
-        chart.perimeter += edge;
-        borderLength += edge;
-        ++borderEdges;
-      }
-    }
+    addTriangles(c, *charts[c]);
+    borderLength += charts_[c].perimeter;
+    for (const auto& neighbours : charts[c]->mesh.neighbours)
+      borderEdges += static_cast<std::size_t>(std::count(neighbours.begin(), neighbours.end(), -1));
   }
-  parent_.resize(uvs_.size());
-  for (std::uint32_t i = 0; i < parent_.size(); ++i) parent_[i] = i;
   constexpr double kLargestCell = 4.0;
   cell_ = std::min(kLargestCell, borderLength / static_cast<double>(std::max<std::size_t>(borderEdges, 1)));
   for (Chart& chart : charts_)
     for (const std::uint32_t t : chart.triangles)
       for (std::uint32_t k = 0; k < 3; ++k)
         if (!joined_[localTriangle_[t]][k]) insertBorder(chart, {t, k});
+}
+
+/// Sets a chart from its own mesh; its border is not yet entered in the cells.
+void ChartSheet::addTriangles(std::uint32_t index, const FlatChart& flat) {
+  Chart& chart = charts_[index];
+  chart = {};
+  const auto base = static_cast<std::uint32_t>(uvs_.size());
+  uvs_.insert(uvs_.end(), flat.uvs.begin(), flat.uvs.end());
+  for (std::uint32_t i = 0; i < flat.uvs.size(); ++i) {
+    chart.vertices.push_back(base + i);
+    parent_.push_back(base + i);
+  }
+  chart.triangles = flat.mesh.meshTriangles;
+  chart.low = chart.high = flat.uvs[0];
+  for (const Vec2d uv : flat.uvs) {
+    chart.low = glm::min(chart.low, uv);
+    chart.high = glm::max(chart.high, uv);
+  }
+  for (std::size_t t = 0; t < flat.mesh.triangles.size(); ++t) {
+    const std::uint32_t triangle = flat.mesh.meshTriangles[t];
+    const std::uint32_t local = localTriangle_[triangle];
+    chartOf_[local] = index;
+    chart.normals = NormalMoments(chart.normals, NormalMoments(areaNormal(mesh_, triangle)));
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      cornerVertex_[local][k] = base + flat.mesh.triangles[t][k];
+      joined_[local][k] = flat.mesh.neighbours[t][k] >= 0;
+      if (!joined_[local][k]) chart.perimeter += length({triangle, k});
+    }
+  }
 }
 
 std::uint32_t ChartSheet::vertexAt(std::uint32_t triangle, std::uint32_t k) const {
@@ -234,7 +237,7 @@ bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const RigidMoti
     welded[vertexAt(other.triangle, (other.k + 1) % 3)] = uvs_[vertexAt(edge.triangle, edge.k)];
   }
   Vec2d low = target.low, high = target.high;
-  const double maxStretch = options.maxStretch * std::sqrt(smallChartSlack(moved.area));
+  const double maxStretch = options.maxStretch * std::sqrt(smallChartSlack(moved.normals.area));
   for (const std::uint32_t t : moved.triangles) {
     std::array<Vec2d, 3> uv = corners(t);
     bool touched = false;
@@ -279,7 +282,7 @@ void ChartSheet::join(std::uint32_t into, std::uint32_t from, const RigidMotion&
     target.perimeter -= 2 * length(edge);
   }
   target.perimeter += moved.perimeter;
-  target.area += moved.area;
+  target.normals = NormalMoments(target.normals, moved.normals);
   for (const std::uint32_t t : moved.triangles) {
     chartOf_[localTriangle_[t]] = into;
     for (std::uint32_t k = 0; k < 3; ++k) {
@@ -292,6 +295,38 @@ void ChartSheet::join(std::uint32_t into, std::uint32_t from, const RigidMotion&
   target.triangles.insert(target.triangles.end(), moved.triangles.begin(), moved.triangles.end());
   target.vertices.insert(target.vertices.end(), moved.vertices.begin(), moved.vertices.end());
   moved = {};
+}
+
+ChartMesh ChartSheet::together(std::uint32_t a, std::uint32_t b, const std::vector<MeshEdge>& shared) const {
+  ChartMesh mesh;
+  std::vector<std::uint32_t>& all = mesh.meshTriangles;
+  all = charts_[a].triangles;
+  all.insert(all.end(), charts_[b].triangles.begin(), charts_[b].triangles.end());
+  std::sort(all.begin(), all.end());
+  const auto indexOf = [&all](std::uint32_t triangle) {
+    return static_cast<std::uint32_t>(std::lower_bound(all.begin(), all.end(), triangle) - all.begin());
+  };
+  for (const std::uint32_t t : all) {
+    std::array<std::int32_t, 3> neighbours = {-1, -1, -1};
+    for (std::uint32_t k = 0; k < 3; ++k)
+      if (joined_[localTriangle_[t]][k]) neighbours[k] = static_cast<std::int32_t>(indexOf(static_cast<std::uint32_t>(mesh_.neighbours[t][k])));
+    mesh.neighbours.push_back(neighbours);
+  }
+  for (const MeshEdge edge : shared) {
+    const MeshEdge other = beyond(edge);
+    mesh.neighbours[indexOf(edge.triangle)][edge.k] = static_cast<std::int32_t>(indexOf(other.triangle));
+    mesh.neighbours[indexOf(other.triangle)][other.k] = static_cast<std::int32_t>(indexOf(edge.triangle));
+  }
+  weldCorners(mesh_, mesh);
+  return mesh;
+}
+
+void ChartSheet::replace(std::uint32_t into, std::uint32_t from, const FlatChart& flat) {
+  charts_[from] = {};
+  addTriangles(into, flat);
+  for (const std::uint32_t t : flat.mesh.meshTriangles)
+    for (std::uint32_t k = 0; k < 3; ++k)
+      if (!joined_[localTriangle_[t]][k]) insertBorder(charts_[into], {t, k});
 }
 
 FlatChart ChartSheet::take(std::uint32_t index) const {

@@ -3,6 +3,7 @@
 
 #include <unordered_map>
 
+#include "lightmap/chart_growing.h"
 #include "lightmap/chart_merging.h"
 
 namespace lumel {
@@ -26,7 +27,8 @@ class ChartSheet {
   struct Chart {
     std::vector<std::uint32_t> triangles;  // of the mesh
     std::vector<std::uint32_t> vertices;   // of the sheet
-    double area = 0, perimeter = 0;        // texels
+    NormalMoments normals;
+    double perimeter = 0;                  // texels
     Vec2d low{0.0}, high{0.0};
     std::unordered_map<std::uint64_t, std::vector<MeshEdge>> border;  // by cell; looked up only
   };
@@ -47,6 +49,12 @@ class ChartSheet {
 
   void join(std::uint32_t into, std::uint32_t from, const RigidMotion& motion, const std::vector<MeshEdge>& matched);
 
+  /// The two charts as one mesh, joined along `shared` as well (edges from the side of either), without UVs.
+  ChartMesh together(std::uint32_t a, std::uint32_t b, const std::vector<MeshEdge>& shared) const;
+
+  /// Replaces the two charts by `into` with a new flattening of both.
+  void replace(std::uint32_t into, std::uint32_t from, const FlatChart& flat);
+
   /// The chart as a mesh of its own, cut where edges were not welded.
   FlatChart take(std::uint32_t chart) const;
 
@@ -57,6 +65,7 @@ class ChartSheet {
   std::array<Vec2d, 3> corners(std::uint32_t triangle) const;
   template <class Visit>
   void visitCells(Vec2d a, Vec2d b, Visit visit) const;
+  void addTriangles(std::uint32_t index, const FlatChart& flat);
   void insertBorder(Chart& chart, MeshEdge edge);
   bool staysGood(std::uint32_t triangle, const std::array<Vec2d, 3>& uv, double maxStretch) const;
 
