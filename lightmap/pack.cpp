@@ -80,7 +80,7 @@ std::vector<Group> AtlasPacker::makeGroups(std::span<const PackShape> sources) c
     group.shapes.push_back(i);
     group.room += shapes_[i].room;
   }
-  for (Group& group : groups) sortBySize(shapes_, group.shapes);
+  for (Group& group : groups) sortBySize(shapes_, options_.pageSize, group.shapes);
   std::stable_sort(groups.begin(), groups.end(), [](const Group& a, const Group& b) { return a.room > b.room; });
   return groups;
 }
@@ -101,7 +101,7 @@ std::vector<std::uint32_t> AtlasPacker::selectForPage(std::vector<Group>& groups
     if (group.opened) take(group);
   for (Group& group : groups)
     if (!group.opened && (sum == 0 || sum + group.room <= page)) take(group);
-  sortBySize(shapes_, selected);
+  sortBySize(shapes_, options_.pageSize, selected);
   return selected;
 }
 

@@ -48,18 +48,17 @@ std::vector<Step> stepsOf(std::span<const GridShape> shapes, const std::vector<s
   for (const std::uint32_t i : bySize) steps.push_back({i, Stance::Any});
   if (variant == 0) return steps;
   std::vector<double> rank(shapes.size(), 0.0);
-  for (Step& step : steps) {
-    const GridShape& shape = shapes[step.shape];
-    const double w = shape.size.x;
-    const double h = shape.size.y;
-    rank[step.shape] = std::max(w, h);
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    const GridShape& shape = shapes[steps[k].shape];
+    rank[steps[k].shape] = -static_cast<double>(k);
     if (static_cast<double>(shape.room) < kBoulder * static_cast<double>(totalRoom)) continue;
-    const std::uint64_t size =
-        static_cast<std::uint64_t>(std::max(w, h)) << 32 | static_cast<std::uint64_t>(std::min(w, h));
+    const double longer = std::max(shape.size.x, shape.size.y);
+    const double shorter = std::min(shape.size.x, shape.size.y);
+    const std::uint64_t size = static_cast<std::uint64_t>(longer) << 32 | static_cast<std::uint64_t>(shorter);
     const std::uint64_t random = mixed(variant, size);
     const double jitter = static_cast<double>(random >> 40) / (1 << 24);
-    rank[step.shape] *= variant % 2 == 0 ? 0.6 + 0.8 * jitter : 1.0;
-    step.stance = static_cast<Stance>(random % 3);
+    rank[steps[k].shape] = longer * (variant % 2 == 0 ? 0.6 + 0.8 * jitter : 1.0);
+    steps[k].stance = static_cast<Stance>(random % 3);
   }
   std::stable_sort(steps.begin(), steps.end(),
                    [&](const Step& a, const Step& b) { return rank[a.shape] > rank[b.shape]; });
@@ -102,11 +101,13 @@ double PagePacker::coverage() const {
   return static_cast<double>(covered_) / (static_cast<double>(grid_.width()) * grid_.height());
 }
 
-void sortBySize(std::span<const GridShape> shapes, std::vector<std::uint32_t>& indices) {
+void sortBySize(std::span<const GridShape> shapes, int pageSide, std::vector<std::uint32_t>& indices) {
   const auto key = [&](std::uint32_t i) {
     const GridShape& shape = shapes[i];
-    return std::array<std::size_t, 3>{static_cast<std::size_t>(std::max(shape.size.x, shape.size.y)),
-                                      static_cast<std::size_t>(std::min(shape.size.x, shape.size.y)), shape.cells};
+    const double longer = std::max(shape.size.x, shape.size.y);
+    const double shorter = std::min(shape.size.x, shape.size.y);
+    const double isLong = longer > 0.5 * pageSide ? 1 : 0;
+    return std::array<double, 4>{isLong, shorter, longer, static_cast<double>(shape.cells)};
   };
   std::sort(indices.begin(), indices.end(), [&](std::uint32_t a, std::uint32_t b) {
     const auto keyA = key(a);
@@ -126,7 +127,7 @@ std::optional<std::vector<Place>> packOnPage(std::span<const GridShape> shapes, 
   }
   if (room > cells) return std::nullopt;
   const std::vector<std::uint32_t> original = chosen;
-  sortBySize(shapes, chosen);
+  sortBySize(shapes, std::min(width, height) * settings.block, chosen);
 
   const auto attempt = [&](std::size_t variant,
                            const std::atomic<std::size_t>& firstFit) -> std::optional<std::vector<Place>> {

@@ -41,8 +41,9 @@ class PagePacker {
   std::size_t covered_ = 0;
 };
 
-/// Larger ones first: by their longer side, then the shorter one.
-void sortBySize(std::span<const GridShape> shapes, std::vector<std::uint32_t>& indices);
+/// Larger ones first: those longer than half of the page's side (texels), which find no place late, then by their
+/// shorter side, so that strips fill what broad shapes leave.
+void sortBySize(std::span<const GridShape> shapes, int pageSide, std::vector<std::uint32_t>& indices);
 
 /// All of `chosen` on one page of width x height cells, or nothing. Where plain order of size does not do it, tries
 /// other orders and stances for the shapes that matter, the more the fewer shapes there are; the first variant of a
