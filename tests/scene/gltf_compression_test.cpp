@@ -1,52 +1,11 @@
-// meshopt and Draco: the unit square, encoded once with meshoptimizer 0.18 and Draco 1.5 and kept as literals.
 #include <gtest/gtest.h>
 
-#include "scene/file_access.h"
-#include "tests/scene/gltf_builder.h"
+#include "tests/scene/gltf_samples.h"
 
 namespace lumel {
 namespace {
 
 using Json = nlohmann::json;
-
-constexpr const char* kPositions =
-    "oAAAATMAAAD//wEzAAAAfn0AAAEMAAAA/wEMAAAAfgAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA==";
-constexpr const char* kPositionsTimes3Exponential =
-    "oAABMwAAAGBfAAEwAAAABAABDAAAAGAAATAAAAAEAAAAATAAAAAEAAAAAAAAAAAAAAAAAAAAAAAAAAAAAADyAAAA8gAAAPI=";
-constexpr const char* kNormalsOctahedral = "oAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAADZ/AA==";
-constexpr const char* kRotationsQuaternion = "oAEQAAAAATAAAAD+AAAAAAEQAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAP9/";
-constexpr const char* kTriangles = "4fAAAHaHVmd4qYZliWiYAWkAAA==";
-constexpr const char* kIndexSequence = "0QAEBAYIBAAAAAA=";
-// Positions (11 bits), UVs (10 bits), colours (255, 51, 0, 255); attribute ids 0, 1, 2.
-constexpr const char* kDraco =
-    "RFJBQ08CAgEBAAAABAICAgAAAR//ARH/ARH/ARED/wAAAAAAAQAAAQAJAwAAAgEDCQIAAQIBAgIEAAIBAQEBAAMDATABEAMAKIKYAAAAAAD/BwAAAAAAAAAA"
-    "AAAAAAAAAACAPwsBAQEAAwMBIAEgAwDwg6YAAAAAAP8DAAAAAAAAAAAAAAAAgD8KAQEBAQFnATQBCP+PAQQEAJk+jQAAAAD/AAAA";
-
-std::vector<std::uint8_t> decoded(const std::string& base64) { return *decodeDataUri("data:;base64," + base64); }
-
-/// Adds a view that is compressed with `extension` and whose plain bytes are in a buffer without any.
-int compressedView(GltfBuilder& g, const char* base64, int count, int stride, const char* mode, const char* filter = "NONE",
-                   const char* extension = "EXT_meshopt_compression") {
-  const auto bytes = decoded(base64);
-  const int at = g.view(bytes.data(), bytes.size());
-  Json& view = g.json["bufferViews"][static_cast<std::size_t>(at)];
-  Json compressed = {{"buffer", 0}, {"byteOffset", view["byteOffset"]}, {"byteLength", view["byteLength"]},
-                     {"byteStride", stride}, {"count", count}, {"mode", mode}, {"filter", filter}};
-  view = {{"buffer", 1}, {"byteLength", count * stride}, {"extensions", {{extension, compressed}}}};
-  return at;
-}
-
-GltfBuilder meshoptSquare(const char* indices, const char* mode, const char* extension = "EXT_meshopt_compression") {
-  GltfBuilder g;
-  g.json["extensionsRequired"] = {extension};
-  const int p = g.add("accessors", {{"bufferView", compressedView(g, kPositions, 4, 12, "ATTRIBUTES", "NONE", extension)}, {"componentType", 5126}, {"count", 4}, {"type", "VEC3"}});
-  const int n = g.add("accessors", {{"bufferView", compressedView(g, kNormalsOctahedral, 4, 4, "ATTRIBUTES", "OCTAHEDRAL", extension)}, {"componentType", 5120}, {"normalized", true}, {"count", 4}, {"type", "VEC3"}});
-  g.json["bufferViews"].back()["byteStride"] = 4;
-  const int i = g.add("accessors", {{"bufferView", compressedView(g, indices, 6, 4, mode, "NONE", extension)}, {"componentType", 5125}, {"count", 6}, {"type", "SCALAR"}});
-  g.mesh({{"attributes", {{"POSITION", p}, {"NORMAL", n}}}, {"indices", i}});
-  g.json["buffers"] = {{{"byteLength", g.bin.size()}}, {{"byteLength", 88}, {"extensions", {{extension, {{"fallback", true}}}}}}};
-  return g;
-}
 
 TEST(GltfMeshopt, AttributesTrianglesAndOctahedralNormals) {
   for (const char* extension : {"EXT_meshopt_compression", "KHR_meshopt_compression"}) {
@@ -92,21 +51,6 @@ TEST(GltfMeshopt, DamageIsAnErrorThatNamesTheView) {
   EXPECT_NE(message([](Json& e) { e["byteStride"] = 13; }).find("byteStride 13 does not fit"), std::string::npos);
   EXPECT_NE(message([](Json& e) { e["filter"] = "COLOR"; }).find("filter 'COLOR' with byteStride 12 is not supported"), std::string::npos);
   EXPECT_NE(message([](Json& e) { e["mode"] = "STRIPS"; }).find("bufferViews/0"), std::string::npos);
-}
-
-GltfBuilder dracoSquare() {
-  GltfBuilder g;
-  g.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
-  const auto bytes = decoded(kDraco);
-  const int view = g.view(bytes.data(), bytes.size());
-  const auto attribute = [&](int type, const char* shape, bool normalized) {
-    return g.add("accessors", {{"componentType", type}, {"count", 4}, {"type", shape}, {"normalized", normalized}});
-  };
-  const int p = attribute(5126, "VEC3", false), uv = attribute(5126, "VEC2", false), color = attribute(5121, "VEC4", true);
-  g.mesh({{"attributes", {{"POSITION", p}, {"TEXCOORD_0", uv}, {"COLOR_0", color}}},
-          {"indices", g.add("accessors", {{"componentType", 5123}, {"count", 6}, {"type", "SCALAR"}})},
-          {"extensions", {{"KHR_draco_mesh_compression", {{"bufferView", view}, {"attributes", {{"POSITION", 0}, {"TEXCOORD_0", 1}, {"COLOR_0", 2}}}}}}}});
-  return g;
 }
 
 TEST(GltfDraco, PositionsUvsColoursAndWinding) {
