@@ -126,7 +126,7 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
 
   std::vector<std::unique_ptr<Parsed>> commands;
   std::set<std::string> names;
-  for (auto make : {bakeCommand}) {
+  for (auto make : {bakeCommand, renderCommand, infoCommand, diffCommand}) {
     commands.push_back(std::make_unique<Parsed>());
     commands.back()->command = make();
     names.insert(commands.back()->command.name);
@@ -154,7 +154,7 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
   Parsed& parsed = *chosen();
   if (auto filled = fillOptions(parsed, names); !filled) return filled;
   TerminalProgress progress(parsed.quiet);
-  CommandContext context{progress, parsed.quiet, parsed.command.options.resolved()};
+  CommandContext context{progress, out, parsed.quiet, parsed.command.options.resolved()};
   return parsed.command.run(context);
 }
 

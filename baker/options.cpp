@@ -118,6 +118,19 @@ Option& OptionTable::number(const std::string& name, float& target, Range<float>
   return add(std::move(o));
 }
 
+Option& OptionTable::optionalNumber(const std::string& name, std::optional<float>& target, Range<float> range,
+                                    const std::string& help) {
+  Option o{.name = name, .placeholder = "X", .help = help};
+  o.set = [&target, range](Texts texts) -> Problem {
+    float value = 0.0f;
+    if (auto problem = parseIn(texts[0], range, value)) return problem;
+    target = value;
+    return {};
+  };
+  o.value = [&target] { return target ? nlohmann::ordered_json(*target) : nlohmann::ordered_json(); };
+  return add(std::move(o));
+}
+
 Option& OptionTable::color(const std::string& name, Vec3& target, Range<float> range, const std::string& help) {
   Option o{.name = name, .placeholder = "R G B", .help = help, .values = 3};
   o.set = [&target, range](Texts texts) { return parseColor(texts, range, target); };

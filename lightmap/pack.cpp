@@ -85,10 +85,8 @@ void rasterise(const PackShape& source, Shape& shape) {
     if (!isFiniteTriangle(triangle)) continue;
     std::array<Vec2d, 3> p;
     for (std::size_t i = 0; i < 3; ++i) p[i] = snapToTexelBorder(Vec2d(triangle[i]) + shape.toBitmap);
-    forEachTexelSpan(p, kEdgeMargin, [&](int y, int x0, int x1) {
-      if (y >= 0 && y < shape.texels.height())
-        shape.texels.setSpan(y, std::max(0, x0), std::min(shape.texels.width(), x1));
-    });
+    forEachTexelSpan(p, {0, 0, shape.texels.width(), shape.texels.height()}, kEdgeMargin,
+                     [&](int y, int x0, int x1) { shape.texels.setSpan(y, x0, x1); });
   }
 }
 

@@ -35,16 +35,18 @@ struct PageTexels {
   }
 };
 
-/// Conservative coverage: every texel that shares positive area with a triangle. Parallel and deterministic.
+/// Conservative coverage: every texel that shares positive area with a triangle. UVs within 1/1024 texel of a texel's
+/// border count as on it, so that rounding to float adds no texels. Triangles without area in the atlas, or with UVs
+/// that are not finite, get none; what lies outside the page is cut off. Parallel and deterministic.
 std::vector<PageTexels> findTexels(const Atlas& atlas);
 
 /// A point of the surface inside a texel, ready to gather light at.
 struct SurfacePoint {
-  Vec3 position;           // world
-  Vec3 geometricNormal;    // world, unit, front side
-  Frame frame;             // world; the bake frame, orthonormal: n is the shading normal
+  Vec3 position;         // world
+  Vec3 geometricNormal;  // world, unit, front side
+  Frame frame;           // world; the bake frame, orthonormal: n is the shading normal
   TriangleRef triangle;
-  Vec3 barycentric;        // of the triangle's three vertices
+  Vec3 barycentric;  // of the triangle's three vertices
 };
 
 /// The covered part of one texel: its triangles clipped to the texel's square, as a fan of smaller triangles that can
@@ -75,6 +77,8 @@ class TexelFootprint {
   SurfacePoint pointOn(const Piece& piece, Vec2 barycentric) const;
 
   const Atlas* atlas_ = nullptr;
+  int width_ = 0;  // of the page
+  int height_ = 0;
   std::vector<Piece> pieces_;
   double area_ = 0.0;
 };
