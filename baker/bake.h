@@ -1,0 +1,59 @@
+// The main job: irradiance at every texel of an atlas, projected onto the RNM basis.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "lightmap/projection.h"
+#include "lightmap/surface.h"
+#include "lightmap/texels.h"
+#include "scene/expected.h"
+#include "scene/image.h"
+#include "scene/progress.h"
+#include "scene/scene.h"
+
+namespace lumel {
+
+struct BakeOptions {
+  int samples = 256;  // gather rays per texel; rounded up to a power of two would waste: any count >= 1
+  int bounces = 4;    // indirect bounces; 0 = direct light only
+  std::uint64_t seed = 1;
+  Projection projection = Projection::Flat;
+};
+
+/// One atlas page. All images have the page's size; texels without coverage are 0 everywhere.
+struct BakedPage {
+  std::array<Image, 3> rnm;  // RGB
+  Image flat;                // RGB: irradiance / pi
+  // Channels of aux, in order: coverage (area share 0..1), validity (share of gather rays that met no back face of a
+  // single-sided, closed surface: 1 = valid), stderr (standard error of the flat map's luminance), samples.
+  Image aux;
+};
+
+/// Cost and error figures of a bake, written to bake.json.
+struct BakeStats {
+  std::uint64_t texels = 0;
+  std::uint64_t rays = 0;        // closest-hit
+  std::uint64_t shadowRays = 0;  // occlusion
+  double seconds = 0.0;
+  std::size_t nonFiniteSamples = 0;  // counted and left out of the sums, named in `notes`; never silently zeroed
+  double meanFlat = 0.0;             // mean luminance over covered, valid texels
+  double meanStandardError = 0.0;    // mean of aux stderr over the same
+  double projectionResidual = 0.0;   // RMS difference between decoded and true irradiance / pi over sample normals
+                                     // within 30 degrees, relative to meanFlat
+  std::vector<std::string> notes;
+};
+
+struct BakeResult {
+  std::vector<BakedPage> pages;
+  BakeStats stats;
+};
+
+/// Path traces every covered texel. The result depends on scene, atlas and options alone, bit for bit, never on the
+/// number of threads. Errors: Failed (Embree, memory), Interrupted.
+Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                          const BakeOptions& options, Progress& progress);
+
+}  // namespace lumel

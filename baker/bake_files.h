@@ -1,0 +1,53 @@
+// The files of a bake (names and contents: README "File formats"), written so that a reader never sees half of them,
+// and read back by the compositor and by `lumel info`.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "baker/bake.h"
+#include "lightmap/atlas.h"
+#include "scene/expected.h"
+#include "scene/scene.h"
+
+namespace lumel {
+
+struct StageTime {
+  std::string stage;  // "load", "charts", "pack", "texels", "bake", "finish", "write"
+  double seconds = 0.0;
+};
+
+/// Everything that bake.json records beside the pages themselves.
+struct BakeRecord {
+  std::filesystem::path sceneFile;
+  AtlasOptions atlasOptions;
+  BakeOptions bakeOptions;
+  int dilate = 0;  // rings added around charts when writing
+  bool half = false;
+  int threads = 0;
+  std::vector<StageTime> stages;
+  std::size_t peakMemoryBytes = 0;
+  nlohmann::ordered_json settings;  // every option as resolved, for the reader
+};
+
+/// Version of the layout of bake.json; a reader refuses others.
+inline constexpr int kBakeFormat = 1;
+
+/// Writes bake.json, scene.glb, every page's images and, where the scene has one, the sky (sky.exr) into `dir` (made if
+/// needed). Everything is written to a folder inside `dir` first; the old result stays whole until all of the new one
+/// is on disk, bake.json is renamed last. Pages of an older, larger bake are removed.
+/// Everything but bake.json's "run" (times, threads, memory) is the same for the same scene and settings.
+/// Errors: Failed.
+Expected<void> writeBake(const std::filesystem::path& dir, const Scene& scene, const AtlasResult& atlas,
+                         const BakeResult& result, const BakeRecord& record);
+
+/// Finds out before the long work whether `dir` can be written: makes it and a file in it, and removes what it made.
+/// Errors: Failed, naming the folder.
+Expected<void> checkWritable(const std::filesystem::path& dir);
+
+/// File name of a page's image: kind is "rnm0", "rnm1", "rnm2", "flat" or "aux".
+std::string pageFileName(std::size_t page, const std::string& kind);
+
+}  // namespace lumel

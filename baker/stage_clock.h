@@ -1,0 +1,43 @@
+// Wall time per stage and the peak memory of the process.
+#pragma once
+
+#include <sys/resource.h>
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "baker/bake_files.h"
+
+namespace lumel {
+
+class StageClock {
+ public:
+  /// Ends the stage that runs, if any, and starts the next.
+  void start(const std::string& stage) {
+    stop();
+    stages_.push_back({stage, 0.0});
+    started_ = Clock::now();
+    running_ = true;
+  }
+  void stop() {
+    if (running_) stages_.back().seconds = std::chrono::duration<double>(Clock::now() - started_).count();
+    running_ = false;
+  }
+  const std::vector<StageTime>& stages() const { return stages_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::vector<StageTime> stages_;
+  Clock::time_point started_;
+  bool running_ = false;
+};
+
+/// Most memory that this process has had resident so far.
+inline std::size_t peakMemoryBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::size_t>(usage.ru_maxrss) * 1024;  // Linux counts kibibytes
+}
+
+}  // namespace lumel

@@ -1,0 +1,7 @@
+#pragma once
+
+namespace lumel {
+
+inline constexpr const char* kVersion = LUMEL_VERSION;
+
+}  // namespace lumel

@@ -1,0 +1,175 @@
+#include "lightmap/atlas.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+
+#include "lightmap/assemble.h"
+#include "lightmap/density_search.h"
+#include "lightmap/object_layouts.h"
+#include "lightmap/scene_charts.h"
+#include "lightmap/scene_uvs.h"
+#include "scene/parallel.h"
+
+namespace lumel {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+std::string figures(const UvReport& r) {
+  if (!r.present) return "has no TEXCOORD_1";
+  char text[200];
+  std::snprintf(text, sizeof text, "%zu vertices outside 0..1, %.1f of %.1f texels covered twice, %zu triangles without area",
+                r.outOfRangeVertices, r.overlapTexels, r.coveredTexels, r.zeroAreaTriangles);
+  return text;
+}
+
+class AtlasBuilder {
+ public:
+  AtlasBuilder(const Scene& scene, const AtlasOptions& options, Progress& progress)
+      : scene_(scene), options_(options), progress_(progress) {}
+
+  Expected<AtlasResult> build() {
+    for (std::size_t i = 0; i < scene_.instances.size(); ++i) {
+      const Instance& instance = scene_.instances[i];
+      const auto& primitives = scene_.meshes[static_cast<std::size_t>(instance.mesh)].primitives;
+      if (std::any_of(primitives.begin(), primitives.end(), [&](const Primitive& p) { return receivesLight(scene_, instance, p); }))
+        receivers_.push_back(static_cast<int>(i));
+    }
+    placed_.resize(scene_.instances.size());
+    if (Expected<void> used = useSceneUvs(); !used) return used.error();
+    if (Expected<void> generated = generateCharts(); !generated) return generated.error();
+    makeAllSurfaces();
+    return std::move(result_);
+  }
+
+ private:
+  Expected<void> useSceneUvs() {
+    const SceneUvs uvs = examineSceneUvs(scene_, receivers_, options_);
+    AtlasReport& report = result_.report;
+    report.sceneUvs = uvs.reports;
+    std::size_t nextReport = 0;
+    for (const SceneUvUse& use : uvs.uses) {
+      const std::string& name = scene_.instances[static_cast<std::size_t>(use.instance)].name;
+      if (use.used) {
+        while (!report.sceneUvs[nextReport].valid) ++nextReport;
+        placed_[static_cast<std::size_t>(use.instance)] =
+            placeSceneUvs(scene_, use.instance, use.page, options_.pageSize, result_.atlas, report.sceneUvs[nextReport++]);
+      } else {
+        generated_.push_back(use.instance);
+      }
+      if (progress_.cancelled()) return interrupted();
+      (void)name;
+    }
+    for (const UvReport& uv : report.sceneUvs) {
+      if (!uv.valid && options_.uvSource == UvSource::Scene)
+        return inputError("'" + uv.mesh + "': lightmap UVs cannot be used: " + figures(uv) + "; use --uv auto or generate");
+      if (!uv.valid) report.warnings.push_back("'" + uv.mesh + "': TEXCOORD_1 is not valid (" + figures(uv) + "): charts are generated");
+      if (uv.frameCrossingTexels > 0)
+        report.warnings.push_back("'" + uv.mesh + "': " + std::to_string(uv.frameCrossingTexels) +
+                                  " texels lie in charts that cross a break of the material's tangent frame");
+    }
+    result_.atlas.pages.assign(static_cast<std::size_t>(uvs.pageCount), {options_.pageSize, options_.pageSize});
+    return {};
+  }
+
+  Expected<void> generateCharts() {
+    if (generated_.empty()) return {};
+    double area = 0;
+    for (const int i : generated_) area += weightedArea(scene_, scene_.instances[static_cast<std::size_t>(i)]);
+    const bool search = !(options_.texelsPerMeter > 0);
+    const double density = search ? guessDensity(area, options_.pageSize) : static_cast<double>(options_.texelsPerMeter);
+    if (!(area > 0) || !std::isfinite(density)) return {};  // nothing has a surface
+
+    const auto chartStart = Clock::now();
+    UnwrapOptions unwrapOptions;
+    unwrapOptions.maxStretch = static_cast<double>(options_.maxStretch);
+    const int border = 2 * ((options_.padding + 1) / 2);
+    unwrapOptions.largestSide = std::max(1.0, options_.pageSize - border - 1.0) * (search ? kSearchHeadroom : 1.0);
+    progress_.begin("charts", receivers_.size());
+    const ObjectLayouts objects = layOutObjects(scene_, generated_, density, unwrapOptions, progress_);
+    progress_.end();
+    if (progress_.cancelled()) return interrupted();
+    AtlasReport& report = result_.report;
+    report.chartSeconds = secondsSince(chartStart);
+
+    const auto packStart = Clock::now();
+    Expected<ChartPlaces> places = placeCharts(objects, options_, progress_);
+    if (!places) return places.error();
+    report.packSeconds = secondsSince(packStart);
+    result_.atlas.texelsPerMeter = static_cast<float>(density * places->scale);
+    for (const LayoutUse& use : objects.uses) {
+      const Unwrapped& unwrapped = objects.layouts[use.layout].unwrapped;
+      report.nonManifoldEdges += unwrapped.nonManifoldEdges;
+      report.degenerateTriangles += unwrapped.degenerateTriangles;
+      report.generatedCharts += unwrapped.charts.size();
+    }
+    takePlaces(objects, *places);
+    return {};
+  }
+
+  void takePlaces(const ObjectLayouts& objects, const ChartPlaces& places) {
+    Atlas& atlas = result_.atlas;
+    const int firstPage = static_cast<int>(atlas.pages.size());
+    for (const auto& size : places.pages) atlas.pages.push_back({size[0], size[1]});
+    std::size_t shape = 0;
+    for (const LayoutUse& use : objects.uses) {
+      const ObjectLayout& layout = objects.layouts[use.layout];
+      const Instance& instance = scene_.instances[static_cast<std::size_t>(use.instance)];
+      std::vector<PlacedTriangle>& placed = placed_[static_cast<std::size_t>(use.instance)];
+      const bool mirrors = glm::determinant(Mat3(instance.worldFromObject)) < 0;
+      for (const UnwrappedChart& chart : layout.unwrapped.charts) {
+        const ChartPlace& place = places.charts[shape++];
+        const auto index = static_cast<std::uint32_t>(atlas.charts.size());
+        atlas.charts.push_back({-1, atlas.texelsPerMeter * instance.settings.texelDensityScale});
+        const auto& size = places.pages[static_cast<std::size_t>(place.page)];
+        for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
+          const SourceTriangle& source = layout.source[chart.triangles[t]];
+          PlacedTriangle triangle{source.primitive, source.triangle, firstPage + place.page, index, {}};
+          for (std::size_t k = 0; k < 3; ++k) {
+            const Vec2d texel = place.apply(chart.uvs[chart.corners[t][k]]);
+            const std::size_t corner = mirrors && k > 0 ? 3 - k : k;  // the soup was reversed
+            triangle.uvs[corner] = Vec2(texel / Vec2d(size[0], size[1]));
+          }
+          placed.push_back(triangle);
+        }
+      }
+      std::sort(placed.begin(), placed.end(), [](const PlacedTriangle& a, const PlacedTriangle& b) {
+        return a.primitive != b.primitive ? a.primitive < b.primitive : a.triangle < b.triangle;
+      });
+    }
+  }
+
+  void makeAllSurfaces() {
+    std::vector<std::vector<Surface>> made(placed_.size());
+    parallelFor(placed_.size(), 1, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) made[i] = makeSurfaces(scene_, static_cast<int>(i), placed_[i]);
+    });
+    Atlas& atlas = result_.atlas;
+    for (std::vector<Surface>& surfaces : made)
+      for (Surface& surface : surfaces) {
+        for (const std::uint32_t chart : surface.charts)
+          if (atlas.charts[chart].surface < 0) atlas.charts[chart].surface = static_cast<int>(atlas.surfaces.size());
+        atlas.surfaces.push_back(std::move(surface));
+      }
+  }
+
+  const Scene& scene_;
+  const AtlasOptions& options_;
+  Progress& progress_;
+  std::vector<int> receivers_;
+  std::vector<int> generated_;
+  std::vector<std::vector<PlacedTriangle>> placed_;  // per instance of the scene
+  AtlasResult result_;
+};
+
+}  // namespace
+
+Expected<AtlasResult> buildAtlas(const Scene& scene, const AtlasOptions& options, Progress& progress) {
+  return AtlasBuilder(scene, options, progress).build();
+}
+
+}  // namespace lumel

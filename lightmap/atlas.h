@@ -1,0 +1,64 @@
+// Parameterization: which surfaces get a lightmap, their charts and their places on atlas pages.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lightmap/surface.h"
+#include "scene/expected.h"
+#include "scene/progress.h"
+
+namespace lumel {
+
+enum class UvSource {
+  Auto,      // per mesh: a valid TEXCOORD_1 is used as it is, else charts are generated
+  Scene,     // TEXCOORD_1 must be valid: an invalid or missing one is an Input error with figures
+  Generate,  // charts are always generated
+};
+
+struct AtlasOptions {
+  UvSource uvSource = UvSource::Auto;
+  float texelsPerMeter = 0.0f;  // 0: the density that fills one page of pageSize
+  int pageSize = 1024;          // texels on a side; a multiple of 4
+  int padding = 2;              // texels between charts, at least, and to the page's border half of it
+  float maxStretch = 1.25f;     // a chart is split where its largest singular value (relative to uniform) exceeds this
+  int blockAlign = 0;           // chart borders to multiples of this (4 for block compression); 0 = off
+};
+
+/// What a scene-supplied TEXCOORD_1 was found to be. Valid means: present, finite, in 0..1, and no texel covered twice.
+struct UvReport {
+  std::string mesh;               // name of the instance or mesh
+  bool present = false;
+  bool valid = false;
+  std::size_t outOfRangeVertices = 0;
+  std::size_t zeroAreaTriangles = 0;
+  double overlapTexels = 0.0;     // texel area covered more than once, in texels of the page
+  double coveredTexels = 0.0;
+  std::size_t frameCrossingTexels = 0;  // texels in charts that cross a break of the material's tangent frame
+};
+
+/// Figures of the parameterization for logs, bake.json and `lumel info`.
+struct AtlasReport {
+  std::vector<UvReport> sceneUvs;
+  std::vector<std::string> warnings;
+  std::size_t generatedCharts = 0;
+  std::size_t nonManifoldEdges = 0;
+  std::size_t degenerateTriangles = 0;  // placed as zero-area charts' worth of nothing: they get no texels
+  double chartSeconds = 0.0;
+  double packSeconds = 0.0;
+};
+
+struct AtlasResult {
+  Atlas atlas;
+  AtlasReport report;
+};
+
+/// Unwraps and packs every receiving instance (ObjectSettings::receives, material not unlit, not fully transparent).
+/// Instances whose scene UVs are used each get a page region of their own: one instance set that shares an atlas
+/// across distinct meshes without overlap stays on one page at its given place.
+/// Deterministic: the same scene and options give the same atlas for any thread count.
+/// Errors: Usage (page too small for the density asked), Input (UvSource::Scene with invalid UVs), Interrupted.
+Expected<AtlasResult> buildAtlas(const Scene& scene, const AtlasOptions& options, Progress& progress);
+
+}  // namespace lumel

@@ -1,0 +1,117 @@
+#include "lightmap/bake_frame.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+namespace lumel {
+namespace {
+
+struct FrameVertex {  // a vertex of one chart: the key by which copies of one point are found
+  std::array<std::uint32_t, 6> key;  // chart, position, uv
+  std::uint32_t surface;
+  std::uint32_t vertex;
+};
+
+double cornerAngle(Vec3d p, Vec3d a, Vec3d b) {
+  return std::atan2(glm::length(glm::cross(a - p, b - p)), glm::dot(a - p, b - p));
+}
+
+/// dP/du of a triangle, unit, and the handedness of (dP/du, up in the image, n). False: its UVs have no area.
+bool uvTangent(const std::array<Vec3d, 3>& p, const std::array<Vec2d, 3>& uv, Vec3d& t, double& handedness) {
+  const Vec2d e1 = uv[1] - uv[0];
+  const Vec2d e2 = uv[2] - uv[0];
+  const double area = e1.x * e2.y - e1.y * e2.x;
+  const Vec3d along = ((p[1] - p[0]) * e2.y - (p[2] - p[0]) * e1.y) * (area < 0 ? -1.0 : 1.0);
+  const double length = glm::length(along);
+  if (area == 0 || !(length > 0)) return false;
+  t = along / length;
+  handedness = area < 0 ? 1.0 : -1.0;  // v runs down: counter-clockwise charts have negative area
+  return true;
+}
+
+void setMaterialFrames(const Primitive& primitive, const Mat4& worldFromObject, Surface& surface) {
+  const Mat3 linear(worldFromObject);
+  const bool mirrors = glm::determinant(linear) < 0;
+  const Mat3 normalMatrix = glm::transpose(glm::inverse(linear));
+  for (std::size_t i = 0; i < surface.positions.size(); ++i) {
+    const Vec4& source = primitive.tangents[surface.sourceVertex[i]];
+    const Frame frame = frameFromTangent(surface.normals[i], Vec4(linear * Vec3(source), 1.0f));
+    // A mirroring instance turns the handedness over; so does a normal that was turned to the front.
+    const bool turned = glm::dot(normalMatrix * primitive.normals[surface.sourceVertex[i]], surface.normals[i]) < 0;
+    surface.tangents[i] = Vec4(frame.t, ((source.w < 0) != mirrors) != turned ? -1.0f : 1.0f);
+  }
+}
+
+std::array<std::uint32_t, 6> frameKey(const Surface& surface, std::uint32_t chart, std::uint32_t vertex) {
+  const Vec3 p = surface.positions[vertex] + 0.0f;
+  const Vec2 uv = surface.lightmapUvs[vertex] + 0.0f;
+  return {chart, std::bit_cast<std::uint32_t>(p.x), std::bit_cast<std::uint32_t>(p.y), std::bit_cast<std::uint32_t>(p.z),
+          std::bit_cast<std::uint32_t>(uv.x), std::bit_cast<std::uint32_t>(uv.y)};
+}
+
+}  // namespace
+
+bool hasMaterialFrame(const Primitive& primitive) {
+  return !primitive.tangents.empty();
+}
+
+void setBakeFrames(const Scene& scene, std::span<Surface> surfaces) {
+  // Sums of tangents per vertex copy, then over all copies of a chart's point.
+  std::vector<FrameVertex> vertices;
+  std::vector<std::vector<Vec3d>> sums(surfaces.size());
+  std::vector<std::vector<double>> handedness(surfaces.size());
+  for (std::uint32_t s = 0; s < surfaces.size(); ++s) {
+    Surface& surface = surfaces[s];
+    const Instance& instance = scene.instances[static_cast<std::size_t>(surface.instance)];
+    const Primitive& primitive = scene.primitive(instance.mesh, surface.primitive);
+    surface.tangents.assign(surface.positions.size(), Vec4(0, 0, 0, 1));
+    if (hasMaterialFrame(primitive)) {
+      setMaterialFrames(primitive, instance.worldFromObject, surface);
+      continue;
+    }
+    sums[s].assign(surface.positions.size(), Vec3d(0.0));
+    handedness[s].assign(surface.positions.size(), 0.0);
+    std::vector<std::uint32_t> chartOf(surface.positions.size(), 0);
+    for (std::size_t t = 0; t < surface.triangleCount(); ++t) {
+      std::array<Vec3d, 3> p;
+      std::array<Vec2d, 3> uv;
+      const std::uint32_t* v = &surface.indices[3 * t];
+      for (std::size_t k = 0; k < 3; ++k) {
+        p[k] = surface.positions[v[k]];
+        uv[k] = surface.lightmapUvs[v[k]];
+        chartOf[v[k]] = surface.charts[t];
+      }
+      Vec3d tangent;
+      double hand = 0;
+      if (!uvTangent(p, uv, tangent, hand)) continue;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double angle = cornerAngle(p[k], p[(k + 1) % 3], p[(k + 2) % 3]);
+        sums[s][v[k]] += angle * tangent;
+        handedness[s][v[k]] += angle * hand;
+      }
+    }
+    for (std::uint32_t i = 0; i < surface.positions.size(); ++i) vertices.push_back({frameKey(surface, chartOf[i], i), s, i});
+  }
+  std::sort(vertices.begin(), vertices.end(), [](const FrameVertex& a, const FrameVertex& b) {
+    return std::tie(a.key, a.surface, a.vertex) < std::tie(b.key, b.surface, b.vertex);
+  });
+  for (std::size_t first = 0, last; first < vertices.size(); first = last) {
+    Vec3d sum(0.0), normalSum(0.0);
+    double hand = 0;
+    for (last = first; last < vertices.size() && vertices[last].key == vertices[first].key; ++last) {
+      sum += sums[vertices[last].surface][vertices[last].vertex];
+      hand += handedness[vertices[last].surface][vertices[last].vertex];
+      normalSum += Vec3d(surfaces[vertices[last].surface].normals[vertices[last].vertex]);
+    }
+    const double normalLength = glm::length(normalSum);
+    const Vec3 n = normalLength > 1e-6 ? Vec3(normalSum / normalLength)
+                                       : surfaces[vertices[first].surface].normals[vertices[first].vertex];
+    const double length = glm::length(sum);
+    const Vec3 t = frameFromTangent(n, Vec4(length > 0 ? Vec3(sum / length) : Vec3(0.0f), 1.0f)).t;
+    for (std::size_t i = first; i < last; ++i)
+      surfaces[vertices[i].surface].tangents[vertices[i].vertex] = Vec4(t, hand < 0 ? -1.0f : 1.0f);
+  }
+}
+
+}  // namespace lumel

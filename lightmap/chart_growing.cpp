@@ -1,0 +1,253 @@
+#include "lightmap/chart_growing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <queue>
+#include <unordered_map>
+
+namespace lumel {
+namespace {
+
+constexpr double kThinTexels = 0.5;       // creases of triangles thinner than this fade out: no texel could show them
+constexpr double kSmoothCrease = 0.25;    // weight of a crease that is shaded smooth
+constexpr double kShapeWeight = 0.002;    // against ragged borders: only decides between merges that are flat alike
+
+struct Region {
+  double area = 0.0;
+  double perimeter = 0.0;
+  Vec3d normalSum{0.0};
+  std::array<double, 6> normalMoment{};  // xx yy zz xy xz yz, weighted by area
+  Vec3d low{0.0}, high{0.0};
+  std::uint32_t node = 0;
+  std::vector<std::uint32_t> borders;
+  bool alive = true;
+};
+
+struct Border {
+  std::uint32_t a = 0, b = 0;  // regions, a < b at creation
+  double length = 0.0;
+  double crease = 0.0;  // length * (1 - cos of the bend)
+  bool alive = true;
+};
+
+struct Candidate {
+  float cost;
+  std::uint32_t border;
+  bool operator<(const Candidate& other) const {  // the queue's top is the cheapest, then the first
+    return cost != other.cost ? cost > other.cost : border > other.border;
+  }
+};
+
+/// Smallest eigenvalue of a symmetric 3x3 matrix (xx yy zz xy xz yz), by the trigonometric formula.
+double smallestEigenvalue(const std::array<double, 6>& m) {
+  const double mean = (m[0] + m[1] + m[2]) / 3;
+  const double a = m[0] - mean;
+  const double b = m[1] - mean;
+  const double c = m[2] - mean;
+  const double offDiagonal = m[3] * m[3] + m[4] * m[4] + m[5] * m[5];
+  const double p = std::sqrt((a * a + b * b + c * c + 2 * offDiagonal) / 6);
+  if (!(p > 1e-14)) return mean;
+  const double determinant = a * (b * c - m[5] * m[5]) - m[3] * (m[3] * c - m[5] * m[4]) + m[4] * (m[3] * m[5] - b * m[4]);
+  const double r = std::clamp(determinant / (2 * p * p * p), -1.0, 1.0);
+  return mean + 2 * p * std::cos(std::acos(r) / 3 + 2 * std::numbers::pi / 3);
+}
+
+/// Variance of the unit normals along the direction in which they vary least: 0 on planes, cylinders and cones.
+double coneVariance(const Region& a, const Region& b) {
+  const double area = a.area + b.area;
+  const Vec3d n = (a.normalSum + b.normalSum) / area;
+  std::array<double, 6> m;
+  for (std::size_t i = 0; i < 6; ++i) m[i] = (a.normalMoment[i] + b.normalMoment[i]) / area;
+  return std::max(0.0, smallestEigenvalue({m[0] - n.x * n.x, m[1] - n.y * n.y, m[2] - n.z * n.z, m[3] - n.x * n.y,
+                                           m[4] - n.x * n.z, m[5] - n.y * n.z}));
+}
+
+class Grower {
+ public:
+  Grower(const HalfEdgeMesh& mesh, const GrowOptions& options) : mesh_(mesh), options_(options) {}
+
+  MergeTree grow() {
+    tree_.triangleCount = mesh_.size();
+    makeRegions();
+    makeBorders();
+    while (!queue_.empty()) {
+      const Candidate top = queue_.top();
+      queue_.pop();
+      const Border& border = borders_[top.border];
+      if (!border.alive) continue;
+      // Costs are brought up to date only when they come up: a region's growth rarely makes a merge cheaper.
+      const double now = cost(border);
+      if (now > top.cost * 1.0001 + 1e-9) {
+        if (std::isfinite(now)) queue_.push({static_cast<float>(now), top.border});
+        continue;
+      }
+      merge(top.border);
+    }
+    collectRoots();
+    return std::move(tree_);
+  }
+
+ private:
+  double thinness(std::uint32_t triangle) const {
+    const auto& v = mesh_.triangles[triangle];
+    double longest2 = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3d e = mesh_.points[v[(k + 1) % 3]] - mesh_.points[v[k]];
+      longest2 = std::max(longest2, glm::dot(e, e));
+    }
+    return std::min(1.0, glm::length(areaNormal(mesh_, triangle)) / std::sqrt(longest2) / kThinTexels);
+  }
+
+  void makeRegions() {
+    regions_.resize(mesh_.size());
+    for (std::uint32_t t = 0; t < mesh_.size(); ++t) {
+      Region& r = regions_[t];
+      const Vec3d sum = areaNormal(mesh_, t);
+      r.area = 0.5 * glm::length(sum);
+      const Vec3d n = sum / (2 * r.area);
+      r.normalSum = n * r.area;
+      r.normalMoment = {n.x * n.x, n.y * n.y, n.z * n.z, n.x * n.y, n.x * n.z, n.y * n.z};
+      for (double& m : r.normalMoment) m *= r.area;
+      const auto& v = mesh_.triangles[t];
+      r.low = glm::min(mesh_.points[v[0]], glm::min(mesh_.points[v[1]], mesh_.points[v[2]]));
+      r.high = glm::max(mesh_.points[v[0]], glm::max(mesh_.points[v[1]], mesh_.points[v[2]]));
+      for (std::size_t k = 0; k < 3; ++k)
+        r.perimeter += glm::length(mesh_.points[v[(k + 1) % 3]] - mesh_.points[v[k]]);
+      r.node = t;
+    }
+  }
+
+  static std::uint64_t key(std::uint32_t a, std::uint32_t b) {
+    return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
+  }
+
+  void makeBorders() {
+    borderOf_.reserve(mesh_.size() * 3 / 2);
+    for (std::uint32_t t = 0; t < mesh_.size(); ++t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::int32_t other = mesh_.neighbours[t][k];
+        if (other <= static_cast<std::int32_t>(t)) continue;
+        const auto u = static_cast<std::uint32_t>(other);
+        const auto [place, isNew] = borderOf_.try_emplace(key(t, u), static_cast<std::uint32_t>(borders_.size()));
+        if (isNew) {
+          borders_.push_back({t, u, 0, 0, true});
+          regions_[t].borders.push_back(place->second);
+          regions_[u].borders.push_back(place->second);
+        }
+        Border& border = borders_[place->second];
+        const double length = glm::length(mesh_.points[mesh_.triangles[t][(k + 1) % 3]] - mesh_.points[mesh_.triangles[t][k]]);
+        const double bend = 1 - glm::dot(regions_[t].normalSum, regions_[u].normalSum) / (regions_[t].area * regions_[u].area);
+        const double weight = (mesh_.hard[t][k] ? 1.0 : kSmoothCrease) * std::min(thinness(t), thinness(u));
+        border.length += length;
+        border.crease += length * weight * std::max(0.0, bend);
+      }
+    }
+    std::vector<Candidate> first;
+    first.reserve(borders_.size());
+    for (std::uint32_t i = 0; i < borders_.size(); ++i)
+      if (const double c = cost(borders_[i]); std::isfinite(c)) first.push_back({static_cast<float>(c), i});
+    queue_ = std::priority_queue<Candidate>(std::less<Candidate>(), std::move(first));
+  }
+
+  /// Infinite where the merge is out of the question.
+  double cost(const Border& border) const {
+    const Region& a = regions_[border.a];
+    const Region& b = regions_[border.b];
+    const Vec3d extent = glm::max(a.high, b.high) - glm::min(a.low, b.low);
+    constexpr double kNever = std::numeric_limits<double>::infinity();
+    if (std::max({extent.x, extent.y, extent.z}) > options_.largestSide) return kNever;
+    const double crease = border.crease / border.length;
+    if (crease > 1 - options_.maxCreaseCosine) return kNever;
+    const double bend = coneVariance(a, b) / options_.maxConeVariance;
+    if (bend > 1) return kNever;
+    const double perimeter = a.perimeter + b.perimeter - 2 * border.length;
+    const double roundness = perimeter * perimeter / (4 * std::numbers::pi * (a.area + b.area));
+    return bend + crease + kShapeWeight * roundness;
+  }
+
+  void merge(std::uint32_t borderIndex) {
+    std::uint32_t keep = borders_[borderIndex].a;
+    std::uint32_t drop = borders_[borderIndex].b;
+    if (regions_[keep].borders.size() < regions_[drop].borders.size()) std::swap(keep, drop);
+    Region& into = regions_[keep];
+    Region& from = regions_[drop];
+    into.perimeter += from.perimeter - 2 * borders_[borderIndex].length;
+    into.area += from.area;
+    into.normalSum += from.normalSum;
+    for (std::size_t i = 0; i < 6; ++i) into.normalMoment[i] += from.normalMoment[i];
+    into.low = glm::min(into.low, from.low);
+    into.high = glm::max(into.high, from.high);
+    tree_.merges.push_back({into.node, from.node});
+    into.node = static_cast<std::uint32_t>(tree_.triangleCount + tree_.merges.size() - 1);
+    from.alive = false;
+    borders_[borderIndex].alive = false;
+    borderOf_.erase(key(keep, drop));
+    for (const std::uint32_t moved : from.borders) moveBorder(moved, drop, keep);
+    from.borders = {};
+  }
+
+  void moveBorder(std::uint32_t moved, std::uint32_t from, std::uint32_t to) {
+    Border& border = borders_[moved];
+    if (!border.alive) return;
+    const std::uint32_t other = border.a == from ? border.b : border.a;
+    borderOf_.erase(key(from, other));
+    const auto [place, isNew] = borderOf_.try_emplace(key(to, other), moved);
+    if (isNew) {
+      border.a = to;
+      border.b = other;
+      regions_[to].borders.push_back(moved);
+      return;
+    }
+    Border& kept = borders_[place->second];
+    kept.length += border.length;
+    kept.crease += border.crease;
+    border.alive = false;
+    // The longer common border may be a better reason to merge than either part was.
+    if (const double c = cost(kept); std::isfinite(c)) queue_.push({static_cast<float>(c), place->second});
+  }
+
+  void collectRoots() {
+    std::vector<std::uint32_t> parent(tree_.triangleCount + tree_.merges.size(), 0);
+    for (std::uint32_t i = 0; i < parent.size(); ++i) parent[i] = i;
+    for (std::size_t i = tree_.merges.size(); i-- > 0;) {
+      const auto node = static_cast<std::uint32_t>(tree_.triangleCount + i);
+      for (const std::uint32_t child : tree_.merges[i]) parent[child] = parent[node];
+    }
+    std::vector<bool> seen(parent.size(), false);
+    for (std::uint32_t t = 0; t < tree_.triangleCount; ++t) {
+      if (seen[parent[t]]) continue;
+      seen[parent[t]] = true;
+      tree_.roots.push_back(parent[t]);
+    }
+  }
+
+  const HalfEdgeMesh& mesh_;
+  const GrowOptions& options_;
+  std::vector<Region> regions_;
+  std::vector<Border> borders_;
+  std::unordered_map<std::uint64_t, std::uint32_t> borderOf_;  // looked up only, never iterated
+  std::priority_queue<Candidate> queue_;
+  MergeTree tree_;
+};
+
+}  // namespace
+
+std::vector<std::uint32_t> MergeTree::trianglesBelow(std::uint32_t node) const {
+  std::vector<std::uint32_t> found;
+  std::vector<std::uint32_t> open = {node};
+  while (!open.empty()) {
+    const std::uint32_t top = open.back();
+    open.pop_back();
+    if (isLeaf(top)) {
+      found.push_back(top);
+      continue;
+    }
+    open.insert(open.end(), children(top).begin(), children(top).end());
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+MergeTree growCharts(const HalfEdgeMesh& mesh, const GrowOptions& options) { return Grower(mesh, options).grow(); }
+
+}  // namespace lumel

@@ -1,0 +1,51 @@
+// One chart as a mesh of its own, and what a flattening does to it. Lengths are in texels.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "lightmap/half_edge_mesh.h"
+
+namespace lumel {
+
+/// A connected piece of a HalfEdgeMesh. Points of the mesh where the piece merely touches itself are several vertices.
+struct ChartMesh {
+  std::vector<Vec3d> points;
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // into `points`
+  std::vector<std::array<std::int32_t, 3>> neighbours;  // of this chart, beyond edge (k, k + 1); -1 at its border
+  std::vector<std::uint32_t> meshTriangles;             // per triangle: of the HalfEdgeMesh, ascending
+};
+
+/// `triangles`: ascending, of `mesh`; connected over its neighbours.
+ChartMesh makeChartMesh(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> triangles);
+
+/// A triangle laid into the plane without distortion: corner 0 at the origin, corner 1 on the x axis, corner 2 above.
+struct FlatTriangle {
+  double x1 = 0, x2 = 0, y2 = 0;
+};
+FlatTriangle layFlat(const ChartMesh& chart, std::size_t triangle);
+
+/// Sander, Snyder, Gortler and Hoppe 2001, "Texture Mapping Progressive Meshes": singular values of the map from the
+/// texture to the surface, with a chart scaled to its surface's area.
+struct Stretch {
+  double l2 = 0.0;         // root mean square over the surface; 1 is isometric
+  double badShare = 0.0;   // share of the surface where a singular value or its inverse exceeds the limit
+  std::size_t flipped = 0; // triangles turned over by more than a float UV could lose
+};
+Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, double limit);
+
+/// Twice the signed area; positive where counter-clockwise with y up.
+inline double cross2(Vec2d a, Vec2d b) { return a.x * b.y - a.y * b.x; }
+
+/// Scales to the surface's area (uniform density).
+void scaleToSurface(const ChartMesh& chart, std::vector<Vec2d>& uvs);
+
+/// Turns the chart so that its dominant border direction, else its smallest rectangle, is along the axes.
+void alignToAxes(const ChartMesh& chart, std::vector<Vec2d>& uvs);
+
+/// Whether parts of the chart lie on each other by more than `tolerance` texels.
+bool overlapsItself(const ChartMesh& chart, std::span<const Vec2d> uvs, double tolerance);
+
+}  // namespace lumel

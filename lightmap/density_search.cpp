@@ -1,0 +1,113 @@
+#include "lightmap/density_search.h"
+
+#include <cmath>
+#include <optional>
+
+namespace lumel {
+namespace {
+
+class Placer {
+ public:
+  Placer(const ObjectLayouts& objects, const AtlasOptions& options, Progress& progress)
+      : objects_(objects), options_(options), progress_(progress) {}
+
+  Expected<ChartPlaces> placeAt(double scale, bool onePage) {
+    ChartPlaces places;
+    places.scale = scale;
+    std::vector<PackShape> shapes;
+    std::uint32_t group = 0;
+    for (const LayoutUse& use : objects_.uses) {
+      for (const UnwrappedChart& chart : objects_.layouts[use.layout].unwrapped.charts) {
+        places.charts.push_back(start(chart, use.scale * scale));
+        shapes.push_back(shapeOf(chart, places.charts.back(), group));
+      }
+      ++group;
+    }
+    PackOptions pack;
+    pack.pageSize = options_.pageSize;
+    pack.maxPages = onePage ? 1 : 0;
+    pack.padding = options_.padding;
+    pack.blockAlign = options_.blockAlign;
+    pack.shrinkLast = !onePage;
+    Expected<PackResult> packed = packCharts(shapes, pack, progress_);
+    if (!packed) return packed.error();
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      const Placement& placement = packed->placements[i];
+      if (placement.page < 0) return usageError("not all charts fit");
+      places.charts[i].page = placement.page;
+      places.charts[i].quarterTurns = placement.quarterTurns;
+      places.charts[i].offset = Vec2d(placement.offset);
+    }
+    places.pages = std::move(packed->pages);
+    return places;
+  }
+
+  /// The largest density at which everything fits one page, to 1 %.
+  Expected<ChartPlaces> fillOnePage() {
+    constexpr double kStep = 1.2;
+    constexpr double kPrecision = 1.01;
+    constexpr int kMostAttempts = 40;
+    std::optional<ChartPlaces> best;
+    double fits = 0, tooLarge = 0;
+    double scale = 1.0;
+    for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
+      Expected<ChartPlaces> places = placeAt(scale, true);
+      if (places) {
+        best = std::move(*places);
+        fits = scale;
+      } else if (places.error().kind == ErrorKind::Interrupted) {
+        return places.error();
+      } else {
+        tooLarge = scale;
+      }
+      if (fits > 0 && tooLarge > 0 && tooLarge < fits * kPrecision) break;
+      if (fits > 0 && tooLarge > 0)
+        scale = std::sqrt(fits * tooLarge);
+      else
+        scale *= fits > 0 ? kStep : 1 / kStep;
+    }
+    if (best) return std::move(*best);
+    return usageError("the charts do not fit one page of " + std::to_string(options_.pageSize) +
+                      " texels at any density; give --texels-per-meter for several pages, or a larger --page-size");
+  }
+
+ private:
+  static ChartPlace start(const UnwrappedChart& chart, double scale) {
+    ChartPlace place;
+    place.scale = scale;
+    Vec2d high(0.0);  // the chart's own coordinates start at 0
+    for (const Vec2 uv : chart.uvs) high = glm::max(high, Vec2d(uv) * scale);
+    // Centred in the whole texels that it needs: a chart of one texel's size lies in one texel, not across four.
+    const Vec2d cells = glm::max(Vec2d(std::ceil(high.x), std::ceil(high.y)), Vec2d(1.0));
+    place.shift = Vec2d((cells.x - high.x) / 2, cells.y - (cells.y - high.y) / 2);
+    return place;
+  }
+
+  static PackShape shapeOf(const UnwrappedChart& chart, const ChartPlace& place, std::uint32_t group) {
+    PackShape shape;
+    shape.group = group;
+    shape.triangles.reserve(chart.corners.size());
+    for (const auto& corners : chart.corners)
+      shape.triangles.push_back({Vec2(place.apply(chart.uvs[corners[0]])), Vec2(place.apply(chart.uvs[corners[1]])),
+                                 Vec2(place.apply(chart.uvs[corners[2]]))});
+    return shape;
+  }
+
+  const ObjectLayouts& objects_;
+  const AtlasOptions& options_;
+  Progress& progress_;
+};
+
+}  // namespace
+
+double guessDensity(double area, int pageSize) {
+  constexpr double kShare = 0.5;
+  return std::sqrt(kShare * pageSize * pageSize / area);
+}
+
+Expected<ChartPlaces> placeCharts(const ObjectLayouts& objects, const AtlasOptions& options, Progress& progress) {
+  Placer placer(objects, options, progress);
+  return options.texelsPerMeter > 0 ? placer.placeAt(1.0, false) : placer.fillOnePage();
+}
+
+}  // namespace lumel

@@ -1,0 +1,43 @@
+// Packing of all objects' charts, at the density asked or at the one that fills a page.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "lightmap/atlas.h"
+#include "lightmap/object_layouts.h"
+#include "lightmap/pack.h"
+
+namespace lumel {
+
+/// Charts for a density that is still searched are kept this much smaller than the page, so that it may grow.
+inline constexpr double kSearchHeadroom = 0.8;
+
+/// Density at which `area` square metres fill a page about half.
+double guessDensity(double area, int pageSize);
+
+/// page texel = placement(scale * (u, -v) + shift).
+struct ChartPlace {
+  int page = 0;
+  double scale = 1.0;
+  Vec2d shift{0.0};
+  int quarterTurns = 0;
+  Vec2d offset{0.0};
+
+  Vec2d apply(Vec2 uv) const {
+    Vec2d p(uv.x * scale + shift.x, -uv.y * scale + shift.y);
+    for (int i = 0; i < quarterTurns; ++i) p = Vec2d(-p.y, p.x);
+    return p + offset;
+  }
+};
+
+struct ChartPlaces {
+  std::vector<ChartPlace> charts;          // in the order of objects.uses and their layouts' charts
+  std::vector<std::array<int, 2>> pages;   // width, height
+  double scale = 1.0;                      // found: multiplies the density that objects were laid out for
+};
+
+/// Errors: Usage (a chart larger than a page; charts too many for one page at any density), Interrupted.
+Expected<ChartPlaces> placeCharts(const ObjectLayouts& objects, const AtlasOptions& options, Progress& progress);
+
+}  // namespace lumel

@@ -1,0 +1,270 @@
+#include "lightmap/flatten.h"
+
+#include <Eigen/Sparse>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <queue>
+
+namespace lumel {
+namespace {
+
+constexpr double kFlatCosine = 0.9998;    // within 1.15 degrees of the plane: projection shortens by 0.02 %
+constexpr double kThinTexels = 0.01;      // triangles thinner than this may stand askew: nothing of it shows
+constexpr double kOverlapTexels = 2e-3;   // parts may lie on each other by less: far below a sample's distance
+constexpr double kMaxBadShare = 0.004;    // of a chart's surface, beyond the stretch limit
+constexpr double kMaxL2 = 1.03;
+constexpr int kMaxIterations = 30;
+
+Vec3d chartNormal(const ChartMesh& chart) {
+  Vec3d sum(0.0);
+  for (const auto& v : chart.triangles)
+    sum += glm::cross(chart.points[v[1]] - chart.points[v[0]], chart.points[v[2]] - chart.points[v[0]]);
+  const double length = glm::length(sum);
+  return length > 0 ? sum / length : Vec3d(0, 0, 1);
+}
+
+/// Smallest cosine between the plane's normal and any triangle that is not too thin to tell.
+double worstCosine(const ChartMesh& chart, Vec3d normal) {
+  double worst = 1;
+  for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
+    const auto& v = chart.triangles[t];
+    const Vec3d n = glm::cross(chart.points[v[1]] - chart.points[v[0]], chart.points[v[2]] - chart.points[v[0]]);
+    const double area = glm::length(n);
+    const FlatTriangle flat = layFlat(chart, t);
+    const double longest = std::max({flat.x1, std::hypot(flat.x2, flat.y2), std::hypot(flat.x2 - flat.x1, flat.y2)});
+    if (area < kThinTexels * longest) continue;
+    worst = std::min(worst, glm::dot(n, normal) / area);
+  }
+  return worst;
+}
+
+std::vector<Vec2d> project(const ChartMesh& chart, Vec3d normal) {
+  // Any right-handed basis of the plane (Duff et al. 2017), in double.
+  const double sign = std::copysign(1.0, normal.z);
+  const double a = -1 / (sign + normal.z);
+  const Vec3d x(1 + sign * normal.x * normal.x * a, sign * normal.x * normal.y * a, -sign * normal.x);
+  const Vec3d y(normal.x * normal.y * a, sign + normal.y * normal.y * a, -normal.y);
+  std::vector<Vec2d> uvs(chart.points.size());
+  for (std::size_t i = 0; i < uvs.size(); ++i) {
+    const Vec3d p = chart.points[i] - chart.points[0];
+    uvs[i] = {glm::dot(x, p), glm::dot(y, p)};
+  }
+  return uvs;
+}
+
+/// The triangle that is most triangles away from the border: errors of unrolling stay smallest from there.
+std::uint32_t innermostTriangle(const ChartMesh& chart) {
+  std::vector<std::uint32_t> queue;
+  std::vector<bool> seen(chart.triangles.size(), false);
+  for (std::uint32_t t = 0; t < seen.size(); ++t) {
+    const auto& n = chart.neighbours[t];
+    if (n[0] >= 0 && n[1] >= 0 && n[2] >= 0) continue;
+    seen[t] = true;
+    queue.push_back(t);
+  }
+  if (queue.empty()) return 0;
+  for (std::size_t head = 0; head < queue.size(); ++head)
+    for (const std::int32_t n : chart.neighbours[queue[head]])
+      if (n >= 0 && !seen[static_cast<std::size_t>(n)]) {
+        seen[static_cast<std::size_t>(n)] = true;
+        queue.push_back(static_cast<std::uint32_t>(n));
+      }
+  return queue.back();
+}
+
+/// Lays triangle after triangle beside one that lies already, breadth first: exact where the chart is developable.
+std::vector<Vec2d> unroll(const ChartMesh& chart) {
+  std::vector<Vec2d> uvs(chart.points.size(), Vec2d(0.0));
+  std::vector<std::uint8_t> placed(chart.points.size(), 0);
+  std::vector<bool> seen(chart.triangles.size(), false);
+  const std::uint32_t first = innermostTriangle(chart);
+  const FlatTriangle flat = layFlat(chart, first);
+  const auto& v = chart.triangles[first];
+  uvs[v[1]] = {flat.x1, 0};
+  uvs[v[2]] = {flat.x2, flat.y2};
+  for (const std::uint32_t i : v) placed[i] = 1;
+  std::vector<std::uint32_t> queue = {first};
+  seen[first] = true;
+  for (std::size_t head = 0; head < queue.size(); ++head) {
+    const std::uint32_t t = queue[head];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::int32_t n = chart.neighbours[t][k];
+      if (n < 0 || seen[static_cast<std::size_t>(n)]) continue;
+      const auto u = static_cast<std::uint32_t>(n);
+      seen[u] = true;
+      queue.push_back(u);
+      const std::uint32_t a = chart.triangles[t][(k + 1) % 3];  // the edge as the neighbour runs it: a to b
+      const std::uint32_t b = chart.triangles[t][k];
+      std::uint32_t c = 0;
+      for (const std::uint32_t i : chart.triangles[u])
+        if (i != a && i != b) c = i;
+      if (placed[c]) continue;
+      placed[c] = 1;
+      const Vec3d edge = chart.points[b] - chart.points[a];
+      const Vec3d arm = chart.points[c] - chart.points[a];
+      const double length2 = glm::dot(edge, edge);
+      const double along = glm::dot(arm, edge) / length2;
+      const double above = glm::length(glm::cross(edge, arm)) / length2;
+      const Vec2d e = uvs[b] - uvs[a];
+      uvs[c] = uvs[a] + along * e + above * Vec2d(-e.y, e.x);
+    }
+  }
+  return uvs;
+}
+
+/// Local/global iterations: rotations per triangle, then one solve with a matrix that is factored once.
+class RigidRelaxation {
+ public:
+  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), flat_(chart.triangles.size()) {
+    const auto unknowns = static_cast<Eigen::Index>(chart.points.size() - 1);  // point 0 stays at the origin
+    std::vector<Eigen::Triplet<double>> entries;
+    entries.reserve(12 * flat_.size());
+    for (std::size_t t = 0; t < flat_.size(); ++t) {
+      flat_[t] = layFlat(chart, t);
+      const std::array<double, 3> weight = cotangents(flat_[t]);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto i = static_cast<Eigen::Index>(chart.triangles[t][k]) - 1;
+        const auto j = static_cast<Eigen::Index>(chart.triangles[t][(k + 1) % 3]) - 1;
+        if (i >= 0) entries.emplace_back(i, i, weight[k]);
+        if (j >= 0) entries.emplace_back(j, j, weight[k]);
+        if (i >= 0 && j >= 0) entries.emplace_back(std::max(i, j), std::min(i, j), -weight[k]);
+      }
+    }
+    Eigen::SparseMatrix<double> matrix(unknowns, unknowns);
+    matrix.setFromTriplets(entries.begin(), entries.end());
+    solver_.compute(matrix);
+  }
+
+  bool usable() const { return solver_.info() == Eigen::Success; }
+
+  /// One iteration; returns how far points moved, root mean square, or a negative number if the solve failed.
+  double step(std::vector<Vec2d>& uvs) const {
+    Eigen::MatrixX2d right = Eigen::MatrixX2d::Zero(static_cast<Eigen::Index>(uvs.size()) - 1, 2);
+    for (std::size_t t = 0; t < flat_.size(); ++t) addTriangle(t, uvs, right);
+    const Eigen::MatrixX2d solved = solver_.solve(right);
+    if (!solved.allFinite()) return -1;
+    double moved = 0;
+    const Vec2d shift = uvs[0];
+    uvs[0] = Vec2d(0.0);
+    for (std::size_t i = 1; i < uvs.size(); ++i) {
+      const Vec2d now(solved(static_cast<Eigen::Index>(i) - 1, 0), solved(static_cast<Eigen::Index>(i) - 1, 1));
+      const Vec2d delta = now + shift - uvs[i];
+      moved += glm::dot(delta, delta);
+      uvs[i] = now;
+    }
+    return std::sqrt(moved / static_cast<double>(uvs.size()));
+  }
+
+ private:
+  static std::array<Vec2d, 3> edges(const FlatTriangle& f) {
+    return {Vec2d(f.x1, 0), Vec2d(f.x2 - f.x1, f.y2), Vec2d(-f.x2, -f.y2)};
+  }
+
+  /// Of the angle opposite each edge (k, k + 1).
+  static std::array<double, 3> cotangents(const FlatTriangle& f) {
+    const std::array<Vec2d, 3> e = edges(f);
+    const double area2 = f.x1 * f.y2;
+    std::array<double, 3> cot;
+    for (std::size_t k = 0; k < 3; ++k) cot[k] = -glm::dot(e[(k + 1) % 3], e[(k + 2) % 3]) / area2;
+    return cot;
+  }
+
+  void addTriangle(std::size_t t, const std::vector<Vec2d>& uvs, Eigen::MatrixX2d& right) const {
+    const std::array<Vec2d, 3> e = edges(flat_[t]);
+    const std::array<double, 3> weight = cotangents(flat_[t]);
+    const auto& v = chart_.triangles[t];
+    double cosine = 0, sine = 0;  // of the rotation that fits best, not yet normalised
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec2d now = uvs[v[(k + 1) % 3]] - uvs[v[k]];
+      cosine += weight[k] * glm::dot(e[k], now);
+      sine += weight[k] * cross2(e[k], now);
+    }
+    const double length = std::hypot(cosine, sine);
+    if (length > 0) {
+      cosine /= length;
+      sine /= length;
+    } else {
+      cosine = 1;
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec2d turned = weight[k] * Vec2d(cosine * e[k].x - sine * e[k].y, sine * e[k].x + cosine * e[k].y);
+      const auto i = static_cast<Eigen::Index>(v[k]) - 1;
+      const auto j = static_cast<Eigen::Index>(v[(k + 1) % 3]) - 1;
+      if (i >= 0) right.row(i) -= Eigen::RowVector2d(turned.x, turned.y);
+      if (j >= 0) right.row(j) += Eigen::RowVector2d(turned.x, turned.y);
+    }
+  }
+
+  const ChartMesh& chart_;
+  std::vector<FlatTriangle> flat_;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
+};
+
+bool isGood(const ChartMesh& chart, std::span<const Vec2d> uvs, const FlattenOptions& options) {
+  const Stretch stretch = measureStretch(chart, uvs, options.maxStretch);
+  return stretch.flipped == 0 && stretch.badShare <= kMaxBadShare && stretch.l2 <= kMaxL2;
+}
+
+/// Whether unrolling alone was as good as isometric.
+bool isDevelopable(const ChartMesh& chart, std::span<const Vec2d> uvs, const FlattenOptions& options) {
+  constexpr double kIsometricL2 = 1.0002;
+  const Stretch stretch = measureStretch(chart, uvs, std::min(options.maxStretch, 1.02));
+  return stretch.flipped == 0 && stretch.badShare <= kMaxBadShare / 4 && stretch.l2 <= kIsometricL2;
+}
+
+/// Relaxes until nothing moves. False: the chart cannot be laid flat well.
+bool relax(const ChartMesh& chart, std::vector<Vec2d>& uvs, const FlattenOptions& options) {
+  const RigidRelaxation relaxation(chart);
+  if (!relaxation.usable()) return false;
+  for (int i = 0; i < kMaxIterations; ++i) {
+    const double moved = relaxation.step(uvs);
+    if (moved < 0) return false;
+    if (moved < 0.01) break;  // texels
+  }
+  scaleToSurface(chart, uvs);
+  return isGood(chart, uvs, options);
+}
+
+bool fits(std::span<const Vec2d> uvs, double largestSide) {
+  Vec2d low = uvs[0], high = uvs[0];
+  for (const Vec2d uv : uvs) {
+    low = glm::min(low, uv);
+    high = glm::max(high, uv);
+  }
+  return std::max(high.x - low.x, high.y - low.y) <= largestSide;
+}
+
+}  // namespace
+
+Flattening flatten(const ChartMesh& chart, const FlattenOptions& options) {
+  Flattening result;
+  if (chart.triangles.size() == 1) {
+    result.uvs = unroll(chart);
+  } else {
+    const Vec3d normal = chartNormal(chart);
+    const double cosine = worstCosine(chart, normal);
+    bool good = false;
+    if (cosine >= kFlatCosine) {
+      result.uvs = project(chart, normal);
+      scaleToSurface(chart, result.uvs);
+      good = isGood(chart, result.uvs, options);
+    }
+    if (!good) {
+      result.uvs = unroll(chart);
+      good = isDevelopable(chart, result.uvs, options);
+    }
+    constexpr double kGentleCosine = 0.3;  // a projection that turns nothing over is a fair start
+    if (!good && cosine > kGentleCosine) {
+      result.uvs = project(chart, normal);
+      good = relax(chart, result.uvs, options);
+    } else if (!good) {
+      good = relax(chart, result.uvs, options);
+    }
+    if (!good || overlapsItself(chart, result.uvs, kOverlapTexels)) return result;
+  }
+  alignToAxes(chart, result.uvs);
+  result.valid = fits(result.uvs, options.largestSide);
+  return result;
+}
+
+}  // namespace lumel

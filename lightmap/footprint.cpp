@@ -1,0 +1,200 @@
+// TexelFootprint of texels.h: a texel's square clipped by its triangles, and points on what is left.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "lightmap/raster.h"
+#include "lightmap/texels.h"
+#include "scene/check.h"
+
+namespace lumel {
+namespace {
+
+/// A convex polygon of at most 7 corners: a triangle cut by a square.
+struct Polygon {
+  std::array<Vec2d, 8> corners;
+  std::size_t count = 0;
+  void add(const Vec2d& p) { corners[count++] = p; }
+};
+
+double cross(const Vec2d& a, const Vec2d& b) { return a.x * b.y - a.y * b.x; }
+
+/// Sutherland and Hodgman 1974, for one side of the square: keeps what has sign * (coordinate - limit) >= 0. The new
+/// corner lies on the side exactly.
+Polygon clipSide(const Polygon& in, int axis, double limit, double sign) {
+  Polygon out;
+  for (std::size_t i = 0; i < in.count; ++i) {
+    const Vec2d& a = in.corners[i];
+    const Vec2d& b = in.corners[i + 1 < in.count ? i + 1 : 0];
+    const double da = sign * (a[axis] - limit);
+    const double db = sign * (b[axis] - limit);
+    if (da >= 0) out.add(a);
+    if ((da > 0 && db < 0) || (da < 0 && db > 0)) {
+      Vec2d corner = a + (b - a) * (da / (da - db));
+      corner[axis] = limit;
+      out.add(corner);
+    }
+  }
+  return out;
+}
+
+Polygon clipToTexel(const std::array<Vec2d, 3>& triangle, TexelCoord texel) {
+  Polygon polygon;
+  for (const Vec2d& p : triangle) polygon.add(p);
+  const double x = texel.x;
+  const double y = texel.y;
+  polygon = clipSide(polygon, 0, x, 1);
+  polygon = clipSide(polygon, 0, x + 1, -1);
+  polygon = clipSide(polygon, 1, y, 1);
+  return clipSide(polygon, 1, y + 1, -1);
+}
+
+struct Corners {
+  std::array<Vec2d, 3> texels;
+  std::array<std::uint32_t, 3> vertices;
+};
+
+Corners cornersOf(const Atlas& atlas, const TriangleRef& ref, int width, int height) {
+  const Surface& surface = atlas.surfaces[ref.surface];
+  Corners corners;
+  for (std::size_t i = 0; i < 3; ++i) {
+    corners.vertices[i] = surface.indices[std::size_t{3} * ref.triangle + i];
+    corners.texels[i] = snapToTexelBorder(Vec2d(surface.lightmapUvs[corners.vertices[i]]) * Vec2d(width, height));
+  }
+  return corners;
+}
+
+/// Weights of vertices 1 and 2 for p, kept inside the triangle against rounding.
+Vec2 barycentricOf(const std::array<Vec2d, 3>& t, const Vec2d& p) {
+  const double twiceArea = cross(t[1] - t[0], t[2] - t[0]);
+  const double w1 = std::clamp(cross(p - t[0], t[2] - t[0]) / twiceArea, 0.0, 1.0);
+  const double w2 = std::clamp(cross(t[1] - t[0], p - t[0]) / twiceArea, 0.0, 1.0 - w1);
+  return {static_cast<float>(w1), static_cast<float>(w2)};
+}
+
+Vec2d closestOnSegment(const Vec2d& a, const Vec2d& b, const Vec2d& p) {
+  const Vec2d ab = b - a;
+  const double length2 = glm::dot(ab, ab);
+  return length2 > 0 ? a + ab * std::clamp(glm::dot(p - a, ab) / length2, 0.0, 1.0) : a;
+}
+
+Vec2d closestInTriangle(const std::array<Vec2d, 3>& t, const Vec2d& p) {
+  const double sign = cross(t[1] - t[0], t[2] - t[0]) < 0 ? -1 : 1;
+  bool inside = true;
+  Vec2d best = t[0];
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vec2d& a = t[i];
+    const Vec2d& b = t[(i + 1) % 3];
+    inside = inside && sign * cross(b - a, p - a) >= 0;
+    const Vec2d q = closestOnSegment(a, b, p);
+    if (glm::dot(q - p, q - p) < glm::dot(best - p, best - p)) best = q;
+  }
+  return inside ? p : best;
+}
+
+/// Unit vector, or `fallback` where v has no direction.
+Vec3 unitOr(const Vec3d& v, const Vec3& fallback) {
+  const double length = std::sqrt(glm::dot(v, v));
+  return length > 1e-150 && std::isfinite(length) ? Vec3(v / length) : fallback;
+}
+
+}  // namespace
+
+double TexelFootprint::clip(const Atlas& atlas, const PageTexels& page, std::size_t texel) {
+  atlas_ = &atlas;
+  width_ = page.width;
+  height_ = page.height;
+  pieces_.clear();
+  area_ = 0.0;
+  for (const TriangleRef& ref : page.trianglesOf(texel)) {
+    const Corners corners = cornersOf(atlas, ref, width_, height_);
+    const Polygon polygon = clipToTexel(corners.texels, page.coords[texel]);
+    for (std::size_t i = 2; i < polygon.count; ++i) {
+      const std::array<Vec2d, 3> piece = {polygon.corners[0], polygon.corners[i - 1], polygon.corners[i]};
+      const double area = 0.5 * std::abs(cross(piece[1] - piece[0], piece[2] - piece[0]));
+      if (!(area > 0)) continue;
+      Piece added{ref, {}, area_, area};
+      for (std::size_t k = 0; k < 3; ++k) added.barycentric[k] = barycentricOf(corners.texels, piece[k]);
+      pieces_.push_back(added);
+      area_ += area;
+    }
+  }
+  return area_;
+}
+
+SurfacePoint TexelFootprint::sample(Vec2 u) const {
+  LUMEL_CHECK(!pieces_.empty());
+  const double target = static_cast<double>(u.x) * area_;
+  const auto next = std::upper_bound(pieces_.begin() + 1, pieces_.end(), target,
+                                     [](double value, const Piece& piece) { return value < piece.areaBefore; });
+  const Piece& piece = *(next - 1);
+  // What is left of u.x within the piece is uniform again. (r, u.y) -> triangle preserves area: lines of constant r
+  // are parallel to the side opposite to corner 0, and the triangle that they cut off at it has the share r.
+  const double r = std::clamp((target - piece.areaBefore) / piece.area, 0.0, 1.0);
+  const auto reach = static_cast<float>(std::sqrt(r));
+  const std::array<Vec2, 3>& c = piece.barycentric;
+  return pointOn(piece, c[0] + reach * ((1.0f - u.y) * (c[1] - c[0]) + u.y * (c[2] - c[0])));
+}
+
+SurfacePoint TexelFootprint::centroid() const {
+  LUMEL_CHECK(!pieces_.empty());
+  const auto texelsOf = [&](const Piece& piece) {
+    const Corners corners = cornersOf(*atlas_, piece.triangle, width_, height_);
+    std::array<Vec2d, 3> points;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vec2d w(piece.barycentric[i]);
+      points[i] = corners.texels[0] + w.x * (corners.texels[1] - corners.texels[0]) +
+                  w.y * (corners.texels[2] - corners.texels[0]);
+    }
+    return points;
+  };
+  Vec2d mean(0);
+  for (const Piece& piece : pieces_) {
+    const auto t = texelsOf(piece);
+    mean += (piece.area / (3 * area_)) * (t[0] + t[1] + t[2]);
+  }
+  const Piece* nearest = nullptr;
+  Vec2d nearestPoint(0);
+  double leastDistance2 = std::numeric_limits<double>::infinity();
+  for (const Piece& piece : pieces_) {
+    const Vec2d point = closestInTriangle(texelsOf(piece), mean);
+    const double distance2 = glm::dot(point - mean, point - mean);
+    if (distance2 >= leastDistance2) continue;
+    leastDistance2 = distance2;
+    nearest = &piece;
+    nearestPoint = point;
+  }
+  return pointOn(*nearest, barycentricOf(cornersOf(*atlas_, nearest->triangle, width_, height_).texels, nearestPoint));
+}
+
+SurfacePoint TexelFootprint::pointOn(const Piece& piece, Vec2 barycentric) const {
+  const Surface& surface = atlas_->surfaces[piece.triangle.surface];
+  std::array<std::uint32_t, 3> v;
+  for (std::size_t i = 0; i < 3; ++i) v[i] = surface.indices[std::size_t{3} * piece.triangle.triangle + i];
+  const double w1 = std::clamp(static_cast<double>(barycentric.x), 0.0, 1.0);
+  const double w2 = std::clamp(static_cast<double>(barycentric.y), 0.0, 1.0 - w1);
+  const double w0 = 1.0 - w1 - w2;
+
+  SurfacePoint point;
+  point.triangle = piece.triangle;
+  point.barycentric = Vec3(w0, w1, w2);
+  const Vec3d p0(surface.positions[v[0]]);
+  const Vec3d edge1 = Vec3d(surface.positions[v[1]]) - p0;
+  const Vec3d edge2 = Vec3d(surface.positions[v[2]]) - p0;
+  point.position = Vec3(p0 + w1 * edge1 + w2 * edge2);
+
+  const Vec3d normal =
+      w0 * Vec3d(surface.normals[v[0]]) + w1 * Vec3d(surface.normals[v[1]]) + w2 * Vec3d(surface.normals[v[2]]);
+  // Each normal stands in where the other has no direction.
+  const Vec3 geometric = unitOr(glm::cross(edge1, edge2), unitOr(normal, Vec3(0, 0, 1)));
+  point.geometricNormal = geometric;
+  const Vec4 tangent = static_cast<float>(w0) * surface.tangents[v[0]] +
+                       static_cast<float>(w1) * surface.tangents[v[1]] +
+                       static_cast<float>(w2) * surface.tangents[v[2]];
+  // A chart never mixes handedness, so neither does a triangle: the interpolated w keeps its sign.
+  const bool smooth = glm::dot(normal, normal) > 1e-12;
+  point.frame = frameFromTangent(smooth ? unitOr(normal, geometric) : geometric, tangent);
+  return point;
+}
+
+}  // namespace lumel

@@ -1,0 +1,252 @@
+#include "lightmap/half_edge_mesh.h"
+
+#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
+#include <algorithm>
+#include <bit>
+#include <numeric>
+
+namespace lumel {
+namespace {
+
+constexpr double kDegenerateArea = 1e-12;  // of the longest edge's square: below the rounding of float coordinates
+constexpr float kFrameCos = 0.9986f;       // tangents more than 3 degrees apart are two frames
+constexpr float kHardCos = 0.9986f;
+constexpr double kFoldCos = -0.5;  // sheets of a non-manifold edge are paired unless they fold back on each other
+
+struct MeshTraits : OpenMesh::DefaultTraits {
+  VertexAttributes(OpenMesh::Attributes::None);
+  HalfedgeAttributes(OpenMesh::Attributes::None);
+  EdgeAttributes(OpenMesh::Attributes::None);
+  FaceAttributes(OpenMesh::Attributes::None);
+};
+using OpenMeshMesh = OpenMesh::TriMesh_ArrayKernelT<MeshTraits>;
+
+struct Side {  // of an edge: one triangle's half-edge
+  std::uint32_t low, high;  // welded points
+  std::uint32_t corner;     // 3 * triangle + k: runs from corner k to k + 1
+};
+
+/// Smallest vertex with the same position, per vertex: exact, so it is the same at any scale.
+std::vector<std::uint32_t> weld(const std::vector<Vec3>& positions) {
+  std::vector<std::array<std::uint32_t, 4>> keys(positions.size());
+  for (std::uint32_t i = 0; i < keys.size(); ++i) {
+    const Vec3 p = positions[i] + 0.0f;  // -0 becomes 0
+    keys[i] = {std::bit_cast<std::uint32_t>(p.x), std::bit_cast<std::uint32_t>(p.y), std::bit_cast<std::uint32_t>(p.z), i};
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::uint32_t> first(positions.size());
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    const bool same = i > 0 && std::equal(keys[i].begin(), keys[i].begin() + 3, keys[i - 1].begin());
+    first[keys[i][3]] = same ? first[keys[i - 1][3]] : keys[i][3];
+  }
+  return first;
+}
+
+std::uint32_t findRoot(std::vector<std::uint32_t>& parent, std::uint32_t x) {
+  while (parent[x] != x) x = parent[x] = parent[parent[x]];
+  return x;
+}
+
+std::uint32_t nextCorner(std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
+
+class Builder {
+ public:
+  explicit Builder(const TriangleSoup& soup) : soup_(soup), welded_(weld(soup.positions)) {}
+
+  HalfEdgeMesh build() {
+    keepTriangles();
+    pairSides();
+    cutIntoFans();
+    fillOpenMesh();
+    return std::move(mesh_);
+  }
+
+ private:
+  std::uint32_t vertexAt(std::uint32_t corner) const {
+    return soup_.indices[3 * mesh_.sourceTriangle[corner / 3] + corner % 3];
+  }
+  std::uint32_t pointAt(std::uint32_t corner) const { return welded_[vertexAt(corner)]; }
+
+  void keepTriangles() {
+    for (std::uint32_t t = 0; t < soup_.triangleCount(); ++t) {
+      const std::uint32_t* v = &soup_.indices[3 * t];
+      const Vec3d a = soup_.points[v[0]];
+      const Vec3d b = soup_.points[v[1]];
+      const Vec3d c = soup_.points[v[2]];
+      const Vec3d areaNormal = glm::cross(b - a, c - a);
+      const double longest2 = std::max({glm::dot(b - a, b - a), glm::dot(c - b, c - b), glm::dot(a - c, a - c)});
+      const double area = 0.5 * glm::length(areaNormal);
+      if (!(area > kDegenerateArea * longest2)) {
+        ++mesh_.degenerateTriangles;
+        continue;
+      }
+      mesh_.sourceTriangle.push_back(t);
+      normals_.push_back(Vec3(areaNormal / (2 * area)));
+    }
+  }
+
+  /// Whether a chart may run across the edge, as the material's frame has it; and whether it is shaded hard.
+  bool framesAgree(std::uint32_t cornerA, std::uint32_t cornerB, bool& hard) const {
+    const std::uint32_t a[2] = {vertexAt(cornerA), vertexAt(nextCorner(cornerA))};
+    const std::uint32_t b[2] = {vertexAt(nextCorner(cornerB)), vertexAt(cornerB)};
+    hard = false;
+    for (int i = 0; i < 2; ++i) {
+      if (a[i] == b[i]) continue;
+      if (glm::dot(soup_.normals[a[i]], soup_.normals[b[i]]) < kHardCos) hard = true;
+      const Vec4& frameA = soup_.frames[a[i]];
+      const Vec4& frameB = soup_.frames[b[i]];
+      if ((frameA.w == 0) != (frameB.w == 0)) return false;
+      if (frameA.w == 0) continue;
+      if (frameA.w * frameB.w < 0 || !(glm::dot(Vec3(frameA), Vec3(frameB)) >= kFrameCos)) return false;
+    }
+    return true;
+  }
+
+  void join(std::uint32_t a, std::uint32_t b) {
+    bool isHard = false;
+    if (!framesAgree(a, b, isHard)) return;
+    opposite_[a] = static_cast<std::int32_t>(b);
+    opposite_[b] = static_cast<std::int32_t>(a);
+    mesh_.hard[a / 3][a % 3] = mesh_.hard[b / 3][b % 3] = isHard;
+  }
+
+  void pairSides() {
+    const std::uint32_t corners = static_cast<std::uint32_t>(3 * mesh_.sourceTriangle.size());
+    std::vector<Side> sides(corners);
+    for (std::uint32_t corner = 0; corner < corners; ++corner) {
+      const std::uint32_t a = pointAt(corner);
+      const std::uint32_t b = pointAt(nextCorner(corner));
+      sides[corner] = {std::min(a, b), std::max(a, b), corner};
+    }
+    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+      return std::tie(a.low, a.high, a.corner) < std::tie(b.low, b.high, b.corner);
+    });
+    opposite_.assign(corners, -1);
+    mesh_.hard.assign(corners / 3, {false, false, false});
+    for (std::size_t first = 0, last; first < sides.size(); first = last) {
+      for (last = first + 1; last < sides.size() && sides[last].low == sides[first].low && sides[last].high == sides[first].high;)
+        ++last;
+      const std::size_t count = last - first;
+      if (count == 2 && pointAt(sides[first].corner) != pointAt(sides[first + 1].corner))
+        join(sides[first].corner, sides[first + 1].corner);
+      else if (count >= 2)
+        pairSheets(&sides[first], count);
+    }
+  }
+
+  /// More than two sides, or two of contrary winding: each side finds the flattest partner of opposite direction.
+  void pairSheets(const Side* sides, std::size_t count) {
+    ++mesh_.nonManifoldEdges;
+    struct Pair {
+      float cosine;
+      std::uint32_t forward, backward;
+    };
+    std::vector<Pair> pairs;
+    constexpr std::size_t kMostSides = 64;  // a fan of more sheets is left as separate sheets: n^2 pairs
+    if (count > kMostSides) return;
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t j = 0; j < count; ++j) {
+        const std::uint32_t a = sides[i].corner;
+        const std::uint32_t b = sides[j].corner;
+        if (pointAt(a) != sides[i].low || pointAt(b) == sides[j].low) continue;
+        const float cosine = glm::dot(normals_[a / 3], normals_[b / 3]);
+        if (cosine > kFoldCos) pairs.push_back({cosine, a, b});
+      }
+    std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.cosine > b.cosine; });
+    for (const Pair& pair : pairs)
+      if (opposite_[pair.forward] < 0 && opposite_[pair.backward] < 0) join(pair.forward, pair.backward);
+  }
+
+  /// Corners that are joined around a point become one vertex: points where sheets merely touch are cut apart.
+  void cutIntoFans() {
+    fan_.resize(opposite_.size());
+    std::iota(fan_.begin(), fan_.end(), 0u);
+    const auto unite = [this](std::uint32_t a, std::uint32_t b) {
+      a = findRoot(fan_, a);
+      b = findRoot(fan_, b);
+      if (a != b) fan_[std::max(a, b)] = std::min(a, b);
+    };
+    for (std::uint32_t corner = 0; corner < opposite_.size(); ++corner) {
+      if (opposite_[corner] < static_cast<std::int32_t>(corner)) continue;
+      const auto other = static_cast<std::uint32_t>(opposite_[corner]);
+      unite(corner, nextCorner(other));
+      unite(nextCorner(corner), other);
+    }
+  }
+
+  void fillOpenMesh() {
+    OpenMeshMesh mesh;
+    const std::size_t count = mesh_.sourceTriangle.size();
+    mesh.reserve(count / 2 + 3, 3 * count / 2 + 3, count);
+    std::vector<int> vertexOfFan(fan_.size(), -1);
+    for (std::uint32_t corner = 0; corner < fan_.size(); ++corner) {
+      const std::uint32_t root = findRoot(fan_, corner);
+      if (vertexOfFan[root] < 0) vertexOfFan[root] = addVertex(mesh, corner);
+    }
+    for (std::uint32_t t = 0; t < count; ++t) {
+      std::array<OpenMesh::VertexHandle, 3> v;
+      for (std::uint32_t k = 0; k < 3; ++k) v[k] = OpenMesh::VertexHandle(vertexOfFan[findRoot(fan_, 3 * t + k)]);
+      if (fits(mesh, v) && mesh.add_face(v.data(), 3).is_valid()) continue;
+      // The sheet meets itself here, with its sides taken: the triangle becomes a part of its own.
+      for (std::uint32_t k = 0; k < 3; ++k) v[k] = OpenMesh::VertexHandle(addVertex(mesh, 3 * t + k));
+      ++mesh_.isolatedTriangles;
+      mesh.add_face(v.data(), 3);
+    }
+    readBack(mesh);
+  }
+
+  int addVertex(OpenMeshMesh& mesh, std::uint32_t corner) {
+    mesh_.points.push_back(soup_.points[vertexAt(corner)]);
+    return mesh.add_vertex({}).idx();
+  }
+
+  /// Whether add_face would keep the mesh manifold.
+  static bool fits(const OpenMeshMesh& mesh, const std::array<OpenMesh::VertexHandle, 3>& v) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (v[k] == v[(k + 1) % 3] || !mesh.is_boundary(v[k])) return false;
+      const auto halfedge = mesh.find_halfedge(v[k], v[(k + 1) % 3]);
+      if (halfedge.is_valid() && !mesh.is_boundary(halfedge)) return false;
+    }
+    return true;
+  }
+
+  void readBack(const OpenMeshMesh& mesh) {
+    const std::size_t count = mesh_.sourceTriangle.size();
+    mesh_.triangles.resize(count);
+    mesh_.neighbours.assign(count, {-1, -1, -1});
+    for (std::uint32_t t = 0; t < count; ++t) {
+      auto halfedge = mesh.halfedge_handle(OpenMesh::FaceHandle(static_cast<int>(t)));
+      // add_face may start at any corner: turn until it runs from the first one.
+      for (int turn = 0; turn < 3; ++turn, halfedge = mesh.next_halfedge_handle(halfedge)) {
+        const auto from = static_cast<std::uint32_t>(mesh.from_vertex_handle(halfedge).idx());
+        const std::uint32_t k = cornerOf(t, from, static_cast<std::uint32_t>(turn));
+        mesh_.triangles[t][k] = from;
+        const auto other = mesh.face_handle(mesh.opposite_halfedge_handle(halfedge));
+        const std::int32_t paired = opposite_[3 * t + k];
+        // Two fans may share both ends of an edge that is a break: only paired sides are neighbours.
+        if (other.is_valid() && paired >= 0 && paired / 3 == other.idx()) mesh_.neighbours[t][k] = other.idx();
+      }
+    }
+  }
+
+  std::uint32_t cornerOf(std::uint32_t triangle, std::uint32_t vertex, std::uint32_t guess) const {
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      const std::uint32_t k = (guess + i) % 3;
+      if (mesh_.points[vertex] == soup_.points[vertexAt(3 * triangle + k)]) return k;
+    }
+    return guess;
+  }
+
+  const TriangleSoup& soup_;
+  std::vector<std::uint32_t> welded_;
+  std::vector<Vec3> normals_;            // per kept triangle
+  std::vector<std::int32_t> opposite_;   // per corner: the corner of the paired side, or -1
+  std::vector<std::uint32_t> fan_;       // per corner: union-find over corners joined around a point
+  HalfEdgeMesh mesh_;
+};
+
+}  // namespace
+
+HalfEdgeMesh buildHalfEdgeMesh(const TriangleSoup& soup) { return Builder(soup).build(); }
+
+}  // namespace lumel

@@ -1,0 +1,43 @@
+// The one door to OpenMesh: a triangle soup becomes a half-edge mesh whose every edge has at most two sides.
+// Guéziec, Taubin, Lazarus and Horn 2001, "Cutting and Stitching: Converting Sets of Polygons to Manifold Surfaces".
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "scene/math.h"
+
+namespace lumel {
+
+/// Triangles of one object, counter-clockwise from the front. Arrays but `indices` have one entry per vertex.
+struct TriangleSoup {
+  std::vector<Vec3> positions;  // as in the file: vertices with equal positions (-0 is 0) are one point, others are not
+  std::vector<Vec3d> points;    // the same points in texels at nominal density; every length below is in texels
+  std::vector<Vec3> normals;    // shading normals, unit
+  std::vector<Vec4> frames;     // material tangent and handedness; w = 0: the material sets no frame
+  std::vector<std::uint32_t> indices;
+
+  std::size_t triangleCount() const { return indices.size() / 3; }
+};
+
+/// The repaired mesh. Triangles of the soup without area are left out and counted; every other one is in.
+struct HalfEdgeMesh {
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // into `points`
+  std::vector<std::array<std::int32_t, 3>> neighbours;  // triangle beyond edge (k, k + 1); -1 where none may be joined
+  std::vector<std::array<bool, 3>> hard;                // edge (k, k + 1): the shading normals of its sides differ
+  std::vector<Vec3d> points;                            // texels
+  std::vector<std::uint32_t> sourceTriangle;            // into the soup
+  std::size_t degenerateTriangles = 0;                  // no area: less than 1e-12 of the longest edge's square
+  std::size_t nonManifoldEdges = 0;                     // more than two sides, or two of contrary winding
+  std::size_t isolatedTriangles = 0;                    // could only be kept as a part of their own
+
+  std::size_t size() const { return triangles.size(); }
+};
+
+/// Joins triangles along edges of equal position. Where more than two meet, opposite sides are paired, flattest pair
+/// first. Edges where the material's tangent frame breaks (another tangent, handedness, or a frame on one side only)
+/// are not joined.
+HalfEdgeMesh buildHalfEdgeMesh(const TriangleSoup& soup);
+
+}  // namespace lumel

@@ -1,0 +1,126 @@
+#include "lightmap/object_layouts.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+#include "lightmap/bake_frame.h"
+#include "lightmap/scene_uvs.h"
+#include "scene/parallel.h"
+
+namespace lumel {
+namespace {
+
+using Mat3d = glm::dmat3;
+
+double densityOf(const Instance& instance, double texelsPerMeter) {
+  return texelsPerMeter * static_cast<double>(instance.settings.texelDensityScale);
+}
+
+/// What decides a flattening besides the mesh: how the transform deforms (A^T A up to scale) and whether it mirrors.
+struct Shape {
+  int mesh = 0;
+  bool mirrors = false;
+  std::array<double, 6> gram{};  // divided by its trace
+  double scale = 0.0;            // texels per object unit, root mean square over directions
+};
+
+Shape shapeOf(const Instance& instance, double texelsPerMeter) {
+  const Mat3d linear(Mat3(instance.worldFromObject));
+  const Mat3d gram = glm::transpose(linear) * linear;
+  const double trace = gram[0][0] + gram[1][1] + gram[2][2];
+  Shape shape{instance.mesh, glm::determinant(linear) < 0, {}, std::sqrt(trace / 3) * densityOf(instance, texelsPerMeter)};
+  if (trace > 0)
+    shape.gram = {gram[0][0] / trace, gram[1][1] / trace, gram[2][2] / trace, gram[1][0] / trace, gram[2][0] / trace, gram[2][1] / trace};
+  return shape;
+}
+
+bool sameShape(const Shape& a, const Shape& b) {
+  constexpr double kTolerance = 1e-4;   // stretch of 0.01 % between two instances: float transforms are not exact
+  constexpr double kScaleRange = 0.5;   // thresholds in texels still mean much the same
+  if (a.mesh != b.mesh || a.mirrors != b.mirrors || !(b.scale >= kScaleRange * a.scale)) return false;
+  for (std::size_t i = 0; i < 6; ++i)
+    if (!(std::abs(a.gram[i] - b.gram[i]) <= kTolerance)) return false;
+  return true;
+}
+
+}  // namespace
+
+TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texelsPerMeter, std::vector<SourceTriangle>& source) {
+  TriangleSoup soup;
+  const Mat3d linear = Mat3d(Mat3(instance.worldFromObject)) * densityOf(instance, texelsPerMeter);
+  const bool mirrors = glm::determinant(linear) < 0;
+  const std::vector<Primitive>& primitives = scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives;
+  for (std::size_t p = 0; p < primitives.size(); ++p) {
+    const Primitive& primitive = primitives[p];
+    if (!receivesLight(scene, instance, primitive)) continue;
+    const auto base = static_cast<std::uint32_t>(soup.positions.size());
+    soup.positions.insert(soup.positions.end(), primitive.positions.begin(), primitive.positions.end());
+    soup.normals.insert(soup.normals.end(), primitive.normals.begin(), primitive.normals.end());
+    for (const Vec3& position : primitive.positions) soup.points.push_back(linear * Vec3d(position));
+    if (hasMaterialFrame(primitive))
+      soup.frames.insert(soup.frames.end(), primitive.tangents.begin(), primitive.tangents.end());
+    else
+      soup.frames.resize(soup.positions.size(), Vec4(0.0f));
+    for (std::uint32_t t = 0; t < primitive.triangleCount(); ++t) {
+      source.push_back({static_cast<int>(p), t});
+      for (const std::uint32_t k : {0u, mirrors ? 2u : 1u, mirrors ? 1u : 2u})
+        soup.indices.push_back(base + primitive.indices[3 * t + k]);
+    }
+  }
+  return soup;
+}
+
+double weightedArea(const Scene& scene, const Instance& instance) {
+  const Mat3d linear(Mat3(instance.worldFromObject));
+  double sum = 0;
+  for (const Primitive& primitive : scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives) {
+    if (!receivesLight(scene, instance, primitive)) continue;
+    for (std::size_t t = 0; t < primitive.triangleCount(); ++t) {
+      const Vec3d a = linear * Vec3d(primitive.positions[primitive.indices[3 * t]]);
+      const Vec3d b = linear * Vec3d(primitive.positions[primitive.indices[3 * t + 1]]);
+      const Vec3d c = linear * Vec3d(primitive.positions[primitive.indices[3 * t + 2]]);
+      sum += 0.5 * glm::length(glm::cross(b - a, c - a));
+    }
+  }
+  const double scale = instance.settings.texelDensityScale;
+  return sum * scale * scale;
+}
+
+ObjectLayouts layOutObjects(const Scene& scene, const std::vector<int>& instances, double texelsPerMeter,
+                            const UnwrapOptions& options, Progress& progress) {
+  ObjectLayouts result;
+  std::vector<Shape> shapes;
+  for (const int i : instances) shapes.push_back(shapeOf(scene.instances[static_cast<std::size_t>(i)], texelsPerMeter));
+  std::vector<std::size_t> order(instances.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  // The largest of a mesh's instances leads: a flattening is only ever scaled down, so its charts fit a page.
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return shapes[a].mesh != shapes[b].mesh ? shapes[a].mesh < shapes[b].mesh : shapes[a].scale > shapes[b].scale;
+  });
+  std::vector<std::size_t> leaders;
+  result.uses.resize(instances.size());
+  std::size_t firstOfMesh = 0;
+  for (const std::size_t i : order) {
+    if (!leaders.empty() && shapes[leaders.back()].mesh != shapes[i].mesh) firstOfMesh = leaders.size();
+    std::size_t layout = firstOfMesh;
+    while (layout < leaders.size() && !sameShape(shapes[leaders[layout]], shapes[i])) ++layout;
+    if (layout == leaders.size()) leaders.push_back(i);
+    const double leading = shapes[leaders[layout]].scale;
+    result.uses[i] = {instances[i], layout, leading > 0 ? shapes[i].scale / leading : 1.0};
+  }
+
+  result.layouts.resize(leaders.size());
+  parallelFor(leaders.size(), 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last && !progress.cancelled(); ++i) {
+      ObjectLayout& layout = result.layouts[i];
+      const Instance& instance = scene.instances[static_cast<std::size_t>(instances[leaders[i]])];
+      const TriangleSoup soup = makeSoup(scene, instance, texelsPerMeter, layout.source);
+      layout.unwrapped = unwrap(soup, options);
+      progress.advance(soup.triangleCount());
+    }
+  });
+  return result;
+}
+
+}  // namespace lumel

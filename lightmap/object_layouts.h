@@ -1,0 +1,45 @@
+// Unwrapping of a scene's instances: coincident instances (the same mesh, moved, turned, or scaled a little) share one
+// flattening, each has its own place later.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "lightmap/unwrap.h"
+#include "scene/progress.h"
+#include "scene/scene.h"
+
+namespace lumel {
+
+struct SourceTriangle {
+  int primitive = 0;
+  std::uint32_t triangle = 0;
+};
+
+struct ObjectLayout {
+  Unwrapped unwrapped;
+  std::vector<SourceTriangle> source;  // per triangle of the soup that was unwrapped
+};
+
+struct LayoutUse {
+  int instance = 0;
+  std::size_t layout = 0;
+  double scale = 1.0;  // multiplies the layout's UVs to give this instance its density
+};
+
+struct ObjectLayouts {
+  std::vector<ObjectLayout> layouts;
+  std::vector<LayoutUse> uses;  // in the order of the instances given
+};
+
+/// The instance's triangles that get a lightmap, in texels, counter-clockwise from the front in the world.
+TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texelsPerMeter, std::vector<SourceTriangle>& source);
+
+/// Surface of the instance in square metres, times the square of its density scale: what it asks of the atlas.
+double weightedArea(const Scene& scene, const Instance& instance);
+
+/// Parallel over layouts. A cancelled run returns early with what it has: ask progress.cancelled().
+ObjectLayouts layOutObjects(const Scene& scene, const std::vector<int>& instances, double texelsPerMeter,
+                            const UnwrapOptions& options, Progress& progress);
+
+}  // namespace lumel

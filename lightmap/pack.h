@@ -1,0 +1,52 @@
+// Packing of chart shapes (not boxes) into atlas pages.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "scene/expected.h"
+#include "scene/math.h"
+#include "scene/progress.h"
+
+namespace lumel {
+
+/// A flattened chart to place: its triangles in texels, in any position.
+struct PackShape {
+  std::vector<std::array<Vec2, 3>> triangles;
+  std::uint32_t group = 0;   // charts of one group (object) are kept on one page where they fit
+  bool mayRotate = true;     // by quarter turns; false where the tangent convention forbids it
+};
+
+struct PackOptions {
+  int pageSize = 1024;
+  int maxPages = 0;      // 0: as many as needed
+  int padding = 2;       // texels between any two charts' covered texels, and half of it (rounded up) to the border
+  int blockAlign = 0;    // charts start on multiples of this, and no block holds texels of two charts; 0 = off
+  bool shrinkLast = true;  // the last page gets the smallest power-of-two sides that hold its charts
+};
+
+/// Where a shape went: page texel = rotate(shape point, quarterTurns) + offset, where one quarter turn maps
+/// (x, y) to (-y, x). `page` is -1 if maxPages ran out.
+struct Placement {
+  int page = -1;
+  int quarterTurns = 0;
+  Vec2 offset{0, 0};
+
+  Vec2 apply(Vec2 p) const {
+    for (int i = 0; i < quarterTurns; ++i) p = Vec2(-p.y, p.x);
+    return p + offset;
+  }
+};
+
+struct PackResult {
+  std::vector<Placement> placements;       // one per shape
+  std::vector<std::array<int, 2>> pages;   // width, height
+};
+
+/// Places every shape so that their conservatively rasterised texels stay `padding` apart. Deterministic.
+/// Errors: Usage (a shape larger than a page), Interrupted.
+Expected<PackResult> packCharts(std::span<const PackShape> shapes, const PackOptions& options, Progress& progress);
+
+}  // namespace lumel

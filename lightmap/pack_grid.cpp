@@ -1,0 +1,224 @@
+#include "lightmap/pack_grid.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace lumel {
+namespace {
+
+constexpr std::uint64_t kAll = ~std::uint64_t{0};
+
+int floorLog2(int n) { return std::bit_width(static_cast<unsigned>(n)) - 1; }
+
+/// Cells where a square of 2^level cells right and down of the cell lies wholly in the mask.
+Bitmap squaresInside(const Bitmap& below, int level) {
+  const int half = 1 << (level - 1);
+  const int width = below.width() - half;
+  const int height = below.height() - half;
+  if (width <= 0 || height <= 0) return {};
+  Bitmap inside(width, height);
+  const auto shifted = [&](const std::uint64_t* row, int i) {
+    const int word = i + half / 64;
+    const int bit = half % 64;
+    const int words = below.wordsPerRow();
+    const std::uint64_t low = word < words ? row[word] : 0;
+    const std::uint64_t high = word + 1 < words ? row[word + 1] : 0;
+    return bit == 0 ? low : (low >> bit) | (high << (64 - bit));
+  };
+  for (int y = 0; y < height; ++y)
+    for (int i = 0; i < inside.wordsPerRow(); ++i) {
+      const std::uint64_t* upper = below.row(y);
+      const std::uint64_t* lower = below.row(y + half);
+      inside.row(y)[i] = upper[i] & lower[i] & shifted(upper, i) & shifted(lower, i);
+    }
+  return inside;
+}
+
+/// Covers what it can of the mask with squares of 2^level cells on a lattice of that step (and at the far ends), where
+/// a square covers something new.
+void coverWithSquares(const Bitmap& inside, int level, Bitmap& covered, std::vector<Probe>& probes) {
+  const int side = 1 << level;
+  for (int y = 0; y < inside.height();
+       y = y + side < inside.height() || y == inside.height() - 1 ? y + side : inside.height() - 1)
+    inside.forEachRun(y, [&](int x0, int x1) {
+      for (int x = x0;;) {
+        const bool isNew = !covered.get(x, y) || !covered.get(x + side - 1, y) || !covered.get(x, y + side - 1) ||
+                           !covered.get(x + side - 1, y + side - 1);
+        if (isNew) {
+          for (int k = 0; k < side; ++k) covered.setSpan(y + k, x, x + side);
+          probes.push_back(
+              {static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), static_cast<std::uint8_t>(level), true});
+        }
+        if (x == x1 - 1) break;
+        x = std::min(x + side, x1 - 1);
+      }
+    });
+}
+
+/// Runs for what squares left: each uncovered stretch of a row, by runs that stay inside the mask.
+void coverWithRuns(const Bitmap& mask, const Bitmap& covered, int maxLevel, std::vector<Probe>& probes) {
+  for (int y = 0; y < mask.height(); ++y)
+    mask.forEachRun(y, [&](int x0, int x1) {
+      for (int x = x0; x < x1;) {
+        if (covered.get(x, y)) {
+          ++x;
+          continue;
+        }
+        int end = x;
+        while (end < x1 && !covered.get(end, y)) ++end;
+        const int roundedUp = end - x > 1 ? floorLog2(end - x - 1) + 1 : 0;
+        const int level = std::min({roundedUp, floorLog2(x1 - x0), maxLevel});
+        const int start = std::min(x, x1 - (1 << level));
+        probes.push_back(
+            {static_cast<std::int16_t>(start), static_cast<std::int16_t>(y), static_cast<std::uint8_t>(level), false});
+        x = start + (1 << level);
+      }
+    });
+}
+
+/// Reorders so that neighbours in the list lie apart: what one probe missed its neighbour is likely to miss too.
+void spread(std::span<Probe> probes) {
+  const std::size_t count = probes.size();
+  if (count < 3) return;
+  std::vector<Probe> ordered;
+  ordered.reserve(count);
+  const std::size_t pot = std::bit_ceil(count);
+  const int bits = std::countr_zero(pot);
+  for (std::size_t i = 0; i < pot; ++i) {
+    std::size_t reversed = 0;
+    for (int b = 0; b < bits; ++b) reversed |= ((i >> b) & 1) << (bits - 1 - b);
+    if (reversed < count) ordered.push_back(probes[reversed]);
+  }
+  std::copy(ordered.begin(), ordered.end(), probes.begin());
+}
+
+}  // namespace
+
+SearchMask searchMask(const Bitmap& mask) {
+  SearchMask search{mask.width(), mask.height(), {}, mask.hash()};
+  std::vector<Bitmap> inside(1, mask);
+  for (int level = 1; level < PackGrid::kSquareLevels; ++level) {
+    Bitmap next = squaresInside(inside.back(), level);
+    if (next.empty() || next.count() == 0) break;
+    inside.push_back(std::move(next));
+  }
+  Bitmap covered(mask.width(), mask.height());
+  for (int level = static_cast<int>(inside.size()) - 1; level >= 1; --level) {
+    const std::size_t first = search.probes.size();
+    coverWithSquares(inside[static_cast<std::size_t>(level)], level, covered, search.probes);
+    spread(std::span(search.probes).subspan(first));
+  }
+  const std::size_t first = search.probes.size();
+  coverWithRuns(mask, covered, PackGrid::kRunLevels - 1, search.probes);
+  const std::span<Probe> runs = std::span(search.probes).subspan(first);
+  spread(runs);
+  std::stable_sort(runs.begin(), runs.end(), [](const Probe& a, const Probe& b) { return a.level > b.level; });
+  return search;
+}
+
+PackGrid::PackGrid(int width, int height, int border)
+    : width_(width), height_(height), border_(border), stride_((width + 63) / 64 + 2) {
+  const std::size_t size = static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height);
+  runs_.assign(kRunLevels, Level(size, 0));
+  squares_.assign(kSquareLevels, Level(size, 0));
+  squares_[0].clear();
+  for (int y = 0; y < height; ++y) {
+    std::uint64_t* words = row(runs_[0], y);
+    for (int i = width / 64; i < stride_; ++i) words[i] = kAll;
+    if (width % 64 != 0) words[width / 64] = kAll << (width % 64);
+  }
+  updateLevels(0, stride_, 0, height);
+  freeCells_ = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+}
+
+void PackGrid::updateLevels(int firstWord, int lastWord, int firstRow, int lastRow) {
+  const auto shiftedOr = [&](const std::uint64_t* a, const std::uint64_t* b, int half, int i) {
+    const int word = i + half / 64;
+    const int bit = half % 64;
+    const auto read = [&](const std::uint64_t* p, int at) { return at < stride_ ? p[at] : kAll; };
+    const std::uint64_t low = read(a, word) | read(b, word);
+    if (bit == 0) return low;
+    return (low >> bit) | ((read(a, word + 1) | read(b, word + 1)) << (64 - bit));
+  };
+  for (int level = 1; level < kRunLevels; ++level) {
+    const int half = 1 << (level - 1);
+    const int begin = std::max(0, firstWord - ((2 * half - 2) / 64 + 1));
+    for (int y = firstRow; y < lastRow; ++y) {
+      const std::uint64_t* below = row(runs_[static_cast<std::size_t>(level - 1)], y);
+      std::uint64_t* out = row(runs_[static_cast<std::size_t>(level)], y);
+      for (int i = begin; i < lastWord; ++i) out[i] = below[i] | shiftedOr(below, below, half, i);
+    }
+  }
+  for (int level = 1; level < kSquareLevels; ++level) {
+    const int half = 1 << (level - 1);
+    const int begin = std::max(0, firstWord - ((2 * half - 2) / 64 + 1));
+    const Level& source = level == 1 ? runs_[0] : squares_[static_cast<std::size_t>(level - 1)];
+    for (int y = std::max(0, firstRow - 2 * half + 1); y < lastRow; ++y) {
+      const std::uint64_t* upper = row(source, y);
+      const std::uint64_t* lower = row(source, std::min(y + half, height_ - 1));
+      std::uint64_t* out = row(squares_[static_cast<std::size_t>(level)], y);
+      for (int i = begin; i < lastWord; ++i) out[i] = upper[i] | lower[i] | shiftedOr(upper, lower, half, i);
+    }
+  }
+}
+
+bool PackGrid::findInRow(const SearchMask& mask, int y, std::vector<std::uint64_t>& free, int* x) const {
+  const int begin = border_;
+  const int end = width_ - border_ - mask.width + 1;  // positions [begin, end)
+  int low = begin >> 6;
+  int high = (end - 1) >> 6;
+  for (int i = low; i <= high; ++i) free[static_cast<std::size_t>(i)] = kAll;
+  free[static_cast<std::size_t>(low)] &= kAll << (begin & 63);
+  free[static_cast<std::size_t>(high)] &= kAll >> (63 - ((end - 1) & 63));
+  for (const Probe& probe : mask.probes) {
+    const Level& level = (probe.square ? squares_ : runs_)[probe.level];
+    const std::uint64_t* taken = row(level, y + probe.dy) + (probe.dx >> 6);
+    const int bit = probe.dx & 63;
+    std::uint64_t any = 0;
+    if (bit == 0) {
+      for (int i = low; i <= high; ++i) any |= free[static_cast<std::size_t>(i)] &= ~taken[i];
+    } else {
+      for (int i = low; i <= high; ++i)
+        any |= free[static_cast<std::size_t>(i)] &= ~((taken[i] >> bit) | (taken[i + 1] << (64 - bit)));
+    }
+    if (any == 0) return false;
+    while (free[static_cast<std::size_t>(low)] == 0) ++low;
+    while (free[static_cast<std::size_t>(high)] == 0) --high;
+  }
+  *x = low * 64 + std::countr_zero(free[static_cast<std::size_t>(low)]);
+  return true;
+}
+
+std::optional<Cell> PackGrid::findFirst(const SearchMask& mask, int firstRow, int lastRow) const {
+  if (mask.width > width_ - 2 * border_ || mask.height > height_ - 2 * border_) return std::nullopt;
+  std::vector<std::uint64_t> free(static_cast<std::size_t>(stride_));
+  int x = 0;
+  const int last = std::min(lastRow, height_ - border_ - mask.height);
+  for (int y = std::max(firstRow, border_); y <= last; ++y)
+    if (findInRow(mask, y, free, &x)) return Cell{x, y};
+  return std::nullopt;
+}
+
+void PackGrid::insert(const Bitmap& taken, int x, int y) {
+  const int firstRow = std::max(0, y);
+  const int lastRow = std::min(height_, y + taken.height());
+  const int firstCell = std::max(0, x);
+  const int lastCell = std::min(width_, x + taken.width());
+  if (firstRow >= lastRow || firstCell >= lastCell) return;
+  for (int cellY = firstRow; cellY < lastRow; ++cellY) {
+    std::uint64_t* words = row(runs_[0], cellY);
+    taken.forEachRun(cellY - y, [&](int x0, int x1) {
+      for (int cell = std::max(0, x0 + x); cell < std::min(width_, x1 + x);) {
+        const int bit = cell & 63;
+        const int count = std::min(64 - bit, std::min(width_, x1 + x) - cell);
+        const std::uint64_t added = (kAll >> (64 - count)) << bit & ~words[cell >> 6];
+        freeCells_ -= static_cast<std::size_t>(std::popcount(added));
+        words[cell >> 6] |= added;
+        cell += count;
+      }
+    });
+  }
+  updateLevels(firstCell >> 6, ((lastCell - 1) >> 6) + 1, firstRow, lastRow);
+}
+
+}  // namespace lumel

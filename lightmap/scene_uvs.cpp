@@ -1,0 +1,153 @@
+#include "lightmap/scene_uvs.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lumel {
+namespace {
+
+constexpr int kPointsPerTexel = 4;  // per axis
+constexpr std::size_t kUvSet = 1;
+constexpr float kRangeTolerance = 1e-5f;       // of the page: rounding of normalised 16-bit UVs
+constexpr double kOverlapShare = 0.001;
+constexpr double kOverlapTexels = 4.0;
+constexpr double kLostSurfaceShare = 0.01;     // surface that the UVs leave without area
+
+/// Sample points of a page; triangles are marked with the half-open rule.
+class PointSet {
+ public:
+  explicit PointSet(int pageSize) : side_(pageSize * kPointsPerTexel), bits_((static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_) + 63) / 64, 0) {}
+
+  /// Calls visit(index) for every point inside the triangle.
+  template <class Visit>
+  void forEachPoint(const std::array<Vec2d, 3>& uv, Visit visit) const {
+    std::array<Vec2d, 3> p;
+    for (std::size_t k = 0; k < 3; ++k) p[k] = uv[k] * static_cast<double>(side_) - 0.5;  // points at whole numbers
+    const double top = std::min({p[0].y, p[1].y, p[2].y});
+    const double bottom = std::max({p[0].y, p[1].y, p[2].y});
+    const int firstRow = std::max(0, static_cast<int>(std::ceil(top)));
+    const int lastRow = std::min(side_ - 1, static_cast<int>(std::ceil(bottom)) - 1);
+    for (int y = firstRow; y <= lastRow; ++y) {
+      double left = std::numeric_limits<double>::infinity(), right = -left;
+      for (std::size_t k = 0; k < 3; ++k) {
+        // Edges run from low to high so that both triangles of an edge compute the same crossing.
+        const Vec2d a = p[k].y < p[(k + 1) % 3].y ? p[k] : p[(k + 1) % 3];
+        const Vec2d b = p[k].y < p[(k + 1) % 3].y ? p[(k + 1) % 3] : p[k];
+        if (!(a.y <= y && y < b.y)) continue;
+        const double x = a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x);
+        left = std::min(left, x);
+        right = std::max(right, x);
+      }
+      if (!(left < right)) continue;
+      const int firstColumn = std::max(0, static_cast<int>(std::ceil(left)));
+      const int lastColumn = std::min(side_ - 1, static_cast<int>(std::ceil(right)) - 1);
+      for (int x = firstColumn; x <= lastColumn; ++x)
+        visit(static_cast<std::size_t>(y) * static_cast<std::size_t>(side_) + static_cast<std::size_t>(x));
+    }
+  }
+
+  bool test(std::size_t i) const { return (bits_[i / 64] >> (i % 64)) & 1u; }
+  void set(std::size_t i) { bits_[i / 64] |= std::uint64_t{1} << (i % 64); }
+
+ private:
+  int side_;
+  std::vector<std::uint64_t> bits_;
+};
+
+constexpr double kTexelsPerPoint = 1.0 / (kPointsPerTexel * kPointsPerTexel);
+
+struct Examination {
+  UvReport report;
+  std::vector<std::array<Vec2d, 3>> triangles;
+};
+
+bool tolerable(double overlapTexels, double coveredTexels) {
+  return overlapTexels <= std::max(kOverlapTexels, kOverlapShare * coveredTexels);
+}
+
+Examination examine(const Scene& scene, const Instance& instance, int pageSize) {
+  Examination result;
+  UvReport& report = result.report;
+  report.mesh = instance.name;
+  report.present = true;
+  double surface = 0, lost = 0;
+  for (const Primitive& primitive : scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives) {
+    if (!receivesLight(scene, instance, primitive) || primitive.indices.empty()) continue;
+    if (primitive.uvSets.size() <= kUvSet || primitive.uvSets[kUvSet].size() != primitive.positions.size()) {
+      report.present = false;
+      return result;
+    }
+    const std::vector<Vec2>& uvs = primitive.uvSets[kUvSet];
+    for (const Vec2& uv : uvs)
+      if (!(uv.x >= -kRangeTolerance && uv.x <= 1 + kRangeTolerance && uv.y >= -kRangeTolerance && uv.y <= 1 + kRangeTolerance))
+        ++report.outOfRangeVertices;  // NaN too
+    for (std::size_t t = 0; t < primitive.triangleCount(); ++t) {
+      std::array<Vec2d, 3> uv;
+      std::array<Vec3d, 3> p;
+      for (std::size_t k = 0; k < 3; ++k) {
+        uv[k] = uvs[primitive.indices[3 * t + k]];
+        p[k] = Vec3d(instance.worldFromObject * Vec4(primitive.positions[primitive.indices[3 * t + k]], 1.0f));
+      }
+      const double area = glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
+      surface += area;
+      const double uvArea = (uv[1].x - uv[0].x) * (uv[2].y - uv[0].y) - (uv[1].y - uv[0].y) * (uv[2].x - uv[0].x);
+      if (uvArea != 0) {
+        result.triangles.push_back(uv);
+      } else if (area > 0) {
+        ++report.zeroAreaTriangles;
+        lost += area;
+      }
+    }
+  }
+  if (report.outOfRangeVertices > 0) return result;
+  PointSet points(pageSize);
+  for (const std::array<Vec2d, 3>& uv : result.triangles)
+    points.forEachPoint(uv, [&](std::size_t i) {
+      if (points.test(i)) report.overlapTexels += kTexelsPerPoint;
+      else report.coveredTexels += kTexelsPerPoint;
+      points.set(i);
+    });
+  report.valid = !result.triangles.empty() && lost <= kLostSurfaceShare * surface &&
+                 tolerable(report.overlapTexels, report.coveredTexels);
+  return result;
+}
+
+}  // namespace
+
+bool receivesLight(const Scene& scene, const Instance& instance, const Primitive& primitive) {
+  if (!instance.settings.receives || primitive.indices.empty()) return false;
+  const Material& material = scene.materials[static_cast<std::size_t>(primitive.material)];
+  const bool invisible = material.alphaMode == AlphaMode::Blend && !(material.baseColor.w > 0);
+  return !material.unlit && !invisible;
+}
+
+SceneUvs examineSceneUvs(const Scene& scene, const std::vector<int>& receivers, const AtlasOptions& options) {
+  SceneUvs result;
+  std::vector<PointSet> pages;
+  for (const int index : receivers) {
+    const Instance& instance = scene.instances[static_cast<std::size_t>(index)];
+    SceneUvUse use{index, false, 0};
+    if (options.uvSource != UvSource::Generate) {
+      Examination examined = examine(scene, instance, options.pageSize);
+      if (examined.report.present || options.uvSource == UvSource::Scene) result.reports.push_back(examined.report);
+      if (examined.report.valid) {
+        use.used = true;
+        for (;; ++use.page) {
+          if (static_cast<std::size_t>(use.page) == pages.size()) pages.emplace_back(options.pageSize);
+          PointSet& page = pages[static_cast<std::size_t>(use.page)];
+          double taken = 0;
+          for (const auto& uv : examined.triangles)
+            page.forEachPoint(uv, [&](std::size_t i) { taken += page.test(i) ? kTexelsPerPoint : 0.0; });
+          if (!tolerable(std::max(0.0, taken), examined.report.coveredTexels)) continue;
+          for (const auto& uv : examined.triangles) page.forEachPoint(uv, [&page](std::size_t i) { page.set(i); });
+          break;
+        }
+      }
+    }
+    result.uses.push_back(use);
+  }
+  result.pageCount = static_cast<int>(pages.size());
+  return result;
+}
+
+}  // namespace lumel

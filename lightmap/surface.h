@@ -1,0 +1,53 @@
+// Lightmapped surfaces: the scene's geometry in world space, cut at chart borders, with its place in the atlas.
+// Made by parameterization (atlas.h), read by texel sampling, by the baker and by the writer of scene.glb.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "scene/math.h"
+#include "scene/scene.h"
+
+namespace lumel {
+
+/// The part of one primitive of one instance that lies on one atlas page. A primitive whose charts need several
+/// pages becomes several surfaces. Vertex arrays have one entry per vertex.
+struct Surface {
+  int instance = 0;   // into Scene::instances
+  int primitive = 0;  // into the primitives of that instance's mesh
+  int page = 0;       // into Atlas::pages
+
+  std::vector<Vec3> positions;              // world
+  std::vector<Vec3> normals;                // world, unit; on the front side of the triangle as wound in `indices`
+  std::vector<Vec4> tangents;               // world, unit; the bake frame: t = xyz, b = w * cross(n, t)
+  std::vector<Vec2> lightmapUvs;            // in the page's 0..1, u right, v down
+  std::vector<std::uint32_t> sourceVertex;  // vertex of the source primitive that this one copies
+
+  std::vector<std::uint32_t> indices;         // three per triangle; counter-clockwise from the front in world space
+                                              // (already reversed for mirroring instances)
+  std::vector<std::uint32_t> sourceTriangle;  // per triangle: triangle of the source primitive
+  std::vector<std::uint32_t> charts;          // per triangle: into Atlas::charts
+
+  std::size_t triangleCount() const { return indices.size() / 3; }
+};
+
+struct Page {
+  int width = 0;   // texels
+  int height = 0;  // texels
+};
+
+struct Chart {
+  int surface = 0;  // a chart belongs to one surface (one instance and primitive, one page)
+  // May differ per chart where it was snapped or scaled per object.
+  float texelsPerMeter = 0.0f;
+};
+
+struct Atlas {
+  std::vector<Surface> surfaces;  // ordered by instance, primitive, page
+  std::vector<Page> pages;
+  std::vector<Chart> charts;
+  float texelsPerMeter = 0.0f;  // nominal density, as given or as found to fill the page; 0 with scene UVs alone
+};
+
+}  // namespace lumel

@@ -1,0 +1,136 @@
+#include "lightmap/unwrap.h"
+
+#include <algorithm>
+
+#include "lightmap/chart_growing.h"
+#include "lightmap/flatten.h"
+#include "scene/parallel.h"
+
+namespace lumel {
+namespace {
+
+struct FlatChart {
+  ChartMesh mesh;
+  std::vector<Vec2d> uvs;
+};
+
+/// Triangles of `chart` by distance in steps from `seed`; -1 is not reached.
+std::vector<int> steps(const ChartMesh& chart, std::uint32_t seed, std::uint32_t& farthest) {
+  std::vector<int> distance(chart.triangles.size(), -1);
+  std::vector<std::uint32_t> queue = {seed};
+  distance[seed] = 0;
+  for (std::size_t head = 0; head < queue.size(); ++head)
+    for (const std::int32_t n : chart.neighbours[queue[head]])
+      if (n >= 0 && distance[static_cast<std::size_t>(n)] < 0) {
+        distance[static_cast<std::size_t>(n)] = distance[queue[head]] + 1;
+        queue.push_back(static_cast<std::uint32_t>(n));
+      }
+  farthest = queue.back();
+  return distance;
+}
+
+/// Two connected halves: what is nearer to one end of the chart than to the other.
+std::array<std::vector<std::uint32_t>, 2> halve(const ChartMesh& chart) {
+  std::uint32_t one = 0, other = 0;
+  steps(chart, 0, one);
+  const std::vector<int> fromOne = steps(chart, one, other);
+  std::uint32_t unused = 0;
+  const std::vector<int> fromOther = steps(chart, other, unused);
+  std::array<std::vector<std::uint32_t>, 2> halves;
+  for (std::uint32_t t = 0; t < chart.triangles.size(); ++t)
+    halves[fromOne[t] <= fromOther[t] ? 0 : 1].push_back(chart.meshTriangles[t]);
+  return halves;
+}
+
+class Unwrapper {
+ public:
+  Unwrapper(const HalfEdgeMesh& mesh, const MergeTree& tree, const UnwrapOptions& options)
+      : mesh_(mesh), tree_(tree), options_(options) {}
+
+  /// Flattens a region, or what it is made of where that fails.
+  std::vector<FlatChart> region(std::uint32_t root) const {
+    std::vector<FlatChart> charts;
+    flattenNode(root, charts);
+    return charts;
+  }
+
+ private:
+  bool tryFlatten(std::vector<std::uint32_t> triangles, FlatChart& chart) const {
+    chart.mesh = makeChartMesh(mesh_, std::move(triangles));
+    Flattening flat = flatten(chart.mesh, {options_.maxStretch, options_.largestSide});
+    chart.uvs = std::move(flat.uvs);
+    return flat.valid;
+  }
+
+  void flattenNode(std::uint32_t node, std::vector<FlatChart>& charts) const {
+    FlatChart chart;
+    if (tryFlatten(tree_.trianglesBelow(node), chart) || tree_.isLeaf(node)) {
+      charts.push_back(std::move(chart));
+      return;
+    }
+    // The last merge is undone if that splits the chart fairly; a tree that grew triangle by triangle would take as
+    // many steps, so there it is halved.
+    constexpr double kFairShare = 0.15;
+    const auto& children = tree_.children(node);
+    const double all = static_cast<double>(chart.mesh.triangles.size());
+    const double share = static_cast<double>(tree_.trianglesBelow(children[0]).size()) / all;
+    if (std::min(share, 1 - share) >= kFairShare) {
+      for (const std::uint32_t child : children) flattenNode(child, charts);
+    } else {
+      flattenHalves(chart.mesh, charts);
+    }
+  }
+
+  void flattenHalves(const ChartMesh& whole, std::vector<FlatChart>& charts) const {
+    for (std::vector<std::uint32_t>& half : halve(whole)) {
+      const bool single = half.size() == 1;
+      FlatChart chart;
+      if (tryFlatten(std::move(half), chart) || single)
+        charts.push_back(std::move(chart));
+      else
+        flattenHalves(chart.mesh, charts);
+    }
+  }
+
+  const HalfEdgeMesh& mesh_;
+  const MergeTree& tree_;
+  const UnwrapOptions& options_;
+};
+
+}  // namespace
+
+Unwrapped unwrap(const TriangleSoup& soup, const UnwrapOptions& options) {
+  const HalfEdgeMesh mesh = buildHalfEdgeMesh(soup);
+  GrowOptions growOptions;
+  growOptions.largestSide = options.largestSide;
+  const MergeTree tree = growCharts(mesh, growOptions);
+  const Unwrapper unwrapper(mesh, tree, options);
+  std::vector<std::vector<FlatChart>> perRegion(tree.roots.size());
+  parallelFor(tree.roots.size(), 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) perRegion[i] = unwrapper.region(tree.roots[i]);
+  });
+
+  Unwrapped result;
+  result.degenerateTriangles = mesh.degenerateTriangles;
+  result.nonManifoldEdges = mesh.nonManifoldEdges;
+  for (std::vector<FlatChart>& region : perRegion)
+    for (FlatChart& flat : region) {
+      UnwrappedChart chart;
+      chart.corners = std::move(flat.mesh.triangles);
+      Vec2d low(std::numeric_limits<double>::infinity()), high = -low;
+      for (const Vec2d uv : flat.uvs) {
+        low = glm::min(low, uv);
+        high = glm::max(high, uv);
+      }
+      result.tooLarge |= std::max(high.x - low.x, high.y - low.y) > options.largestSide;
+      for (const Vec2d uv : flat.uvs) chart.uvs.push_back(Vec2(uv - low));
+      for (const std::uint32_t t : flat.mesh.meshTriangles) chart.triangles.push_back(mesh.sourceTriangle[t]);
+      result.charts.push_back(std::move(chart));
+    }
+  std::stable_sort(result.charts.begin(), result.charts.end(), [](const UnwrappedChart& a, const UnwrappedChart& b) {
+    return a.triangles.front() < b.triangles.front();
+  });
+  return result;
+}
+
+}  // namespace lumel
