@@ -104,7 +104,63 @@ std::map<std::string, std::string> describe(const BakeSettings& s, const HeightF
   return m;
 }
 
+/// Either back end behind one call.
+class Occluder {
+ public:
+  static Expected<Occluder> prepare(const HeightField& field, const BakeSettings& settings) {
+    Occluder self;
+    if (settings.backEnd == BackEnd::Horizon) {
+      self.horizon_.emplace(field, settings.horizon);
+      return self;
+    }
+    if (field.texels.size() > kMostRayTexels)
+      return usageError("--method rays holds about 200 bytes per texel and stops at 4096x4096; use --method horizon");
+    auto built = RayOcclusion::build(field, settings.rays);
+    if (!built) return built.error();
+    self.rays_.emplace(std::move(*built));
+    return self;
+  }
+
+  Image occlusion(const TexelRect& rect, std::span<const Lobe> lobes) const {
+    return horizon_ ? horizon_->occlusion(rect, lobes) : rays_->occlusion(rect, lobes);
+  }
+
+ private:
+  std::optional<Horizon> horizon_;
+  std::optional<RayOcclusion> rays_;
+};
+
+/// Rows [y, y + rows) tile by tile. Errors: Interrupted.
+Expected<Image> bandOcclusion(const Occluder& occluder, const BakeSettings& settings, int width, int y, int rows,
+                              std::span<const Lobe> lobes, Progress& progress) {
+  Image band(width, rows, static_cast<int>(lobes.size()));
+  for (int x = 0; x < width; x += settings.tileWidth) {
+    if (progress.cancelled()) return interrupted();
+    const TexelRect rect{x, y, std::min(settings.tileWidth, width - x), rows};
+    Image tile = occluder.occlusion(rect, lobes);
+    progress.advance(static_cast<std::uint64_t>(rect.width) * static_cast<std::uint64_t>(rect.height));
+    if (rect.width == width) return tile;
+    copyInto(band, x, tile);
+  }
+  return band;
+}
+
 }  // namespace
+
+Expected<BakedInMemory> bakeInMemory(const std::filesystem::path& input, const BakeSettings& settings,
+                                     std::span<const Lobe> lobes, Progress& progress) {
+  auto inputs = readInputs(input, settings);
+  if (!inputs) return inputs.error();
+  auto occluder = Occluder::prepare(inputs->field, settings);
+  if (!occluder) return occluder.error();
+  const int height = inputs->field.height;
+  progress.begin("ssbump", inputs->field.texels.size());
+  auto occlusion = bandOcclusion(*occluder, settings, inputs->field.width, 0, height, lobes, progress);
+  progress.end();
+  if (!occlusion) return occlusion.error();
+  Image normals = bandNormals(*inputs, settings.normalMapGreen, 0, height);
+  return BakedInMemory{std::move(inputs->field), std::move(normals), std::move(*occlusion)};
+}
 
 Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const BakeSettings& settings, Progress& progress) {
   LUMEL_CHECK(settings.tileHeight % 2 == 0 && settings.tileWidth > 0);
@@ -120,17 +176,8 @@ Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const Bak
   const int wanted = settings.backEnd == BackEnd::Horizon ? settings.horizon.reach : settings.rays.reach;
   report.reachTexels = wanted > 0 ? wanted : automaticReach(field);
 
-  std::optional<Horizon> horizon;
-  std::optional<RayOcclusion> rays;
-  if (settings.backEnd == BackEnd::Horizon) {
-    horizon.emplace(field, settings.horizon);
-  } else {
-    if (field.texels.size() > kMostRayTexels)
-      return usageError("--method rays holds about 200 bytes per texel and stops at 4096x4096; use --method horizon");
-    auto built = RayOcclusion::build(field, settings.rays);
-    if (!built) return built.error();
-    rays.emplace(std::move(*built));
-  }
+  auto occluder = Occluder::prepare(field, settings);
+  if (!occluder) return occluder.error();
   auto maps = MapSet::open(settings.maps, field.width, field.height, std::move(inputs->alpha), describe(settings, field, report.reachTexels));
   if (!maps) return maps.error();
   report.prepareSeconds = secondsSince(started);
@@ -138,16 +185,11 @@ Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const Bak
   progress.begin("ssbump", field.texels.size());
   for (int y = 0; y < field.height; y += settings.tileHeight) {
     const int rows = std::min(settings.tileHeight, field.height - y);
-    Image occlusion(field.width, rows, static_cast<int>(maps->lobes().size()));
-    for (int x = 0; x < field.width; x += settings.tileWidth) {
-      if (progress.cancelled()) return interrupted();
-      const TexelRect rect{x, y, std::min(settings.tileWidth, field.width - x), rows};
-      const auto before = Clock::now();
-      copyInto(occlusion, x, horizon ? horizon->occlusion(rect, maps->lobes()) : rays->occlusion(rect, maps->lobes()));
-      report.occlusionSeconds += secondsSince(before);
-      progress.advance(static_cast<std::uint64_t>(rect.width) * static_cast<std::uint64_t>(rect.height));
-    }
-    if (auto done = maps->write(bandNormals(*inputs, settings.normalMapGreen, y, rows), occlusion); !done) return done.error();
+    const auto before = Clock::now();
+    auto occlusion = bandOcclusion(*occluder, settings, field.width, y, rows, maps->lobes(), progress);
+    if (!occlusion) return occlusion.error();
+    report.occlusionSeconds += secondsSince(before);
+    if (auto done = maps->write(bandNormals(*inputs, settings.normalMapGreen, y, rows), *occlusion); !done) return done.error();
   }
   progress.end();
   if (auto done = maps->commit(); !done) return done.error();

@@ -39,4 +39,14 @@ struct BakeReport {
 /// Everything from files to files. Errors: Input, Usage, Failed, Interrupted; none leaves a file behind.
 Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const BakeSettings& settings, Progress& progress);
 
+struct BakedInMemory {
+  HeightField field;
+  Image normals;    // (t, b, n)
+  Image occlusion;  // one channel per lobe
+};
+
+/// The same without files, for maps that fit in memory whole.
+Expected<BakedInMemory> bakeInMemory(const std::filesystem::path& input, const BakeSettings& settings,
+                                     std::span<const Lobe> lobes, Progress& progress);
+
 }  // namespace lumel::ssbump

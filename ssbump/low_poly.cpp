@@ -2,52 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <tuple>
+#include <numeric>
+
+#include "scene/tangents.h"
 
 namespace lumel::ssbump {
 namespace {
-
-/// Tangent (unit, in the triangle's plane) and handedness from the UV gradients; w = 0 where the UVs have no area.
-Vec4 triangleTangent(const Vec3* p, const Vec2* uv) {
-  const Vec3 e1 = p[1] - p[0], e2 = p[2] - p[0];
-  const Vec2 d1 = uv[1] - uv[0], d2 = uv[2] - uv[0];
-  const float det = d1.x * d2.y - d2.x * d1.y;
-  if (std::abs(det) < 1e-20f) return Vec4(0);
-  const Vec3 alongU = (e1 * d2.y - e2 * d1.y) / det;
-  const Vec3 upImage = -(e2 * d1.x - e1 * d2.x) / det;  // v runs down the image
-  const float length = glm::length(alongU);
-  if (!(length > 0)) return Vec4(0);
-  const Vec3 n = glm::cross(e1, e2);
-  return {alongU / length, glm::dot(glm::cross(n, alongU), upImage) < 0 ? -1.0f : 1.0f};
-}
-
-/// Tangents from the UVs, shared by corners that agree in position, normal, UV and handedness, weighted by angle.
-void makeTangents(FlatMesh& mesh) {
-  using Key = std::tuple<float, float, float, float, float, float, float, float, float>;
-  std::map<Key, Vec3> shared;
-  std::vector<Vec4> own(mesh.triangles());
-  const auto keyOf = [&](std::size_t corner, float w) {
-    const Vec3 &p = mesh.positions[corner], &n = mesh.normals[corner];
-    const Vec2& uv = mesh.uvs[corner];
-    return Key{p.x, p.y, p.z, n.x, n.y, n.z, uv.x, uv.y, w};
-  };
-  for (std::size_t f = 0; f < mesh.triangles(); ++f) {
-    own[f] = triangleTangent(&mesh.positions[f * 3], &mesh.uvs[f * 3]);
-    if (own[f].w == 0) continue;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3 a = mesh.positions[f * 3 + (k + 1) % 3] - mesh.positions[f * 3 + k];
-      const Vec3 b = mesh.positions[f * 3 + (k + 2) % 3] - mesh.positions[f * 3 + k];
-      const float cosine = glm::dot(a, b) / std::max(1e-30f, glm::length(a) * glm::length(b));
-      shared[keyOf(f * 3 + k, own[f].w)] += Vec3(own[f]) * std::acos(std::clamp(cosine, -1.0f, 1.0f));
-    }
-  }
-  mesh.tangents.resize(mesh.positions.size());
-  for (std::size_t c = 0; c < mesh.positions.size(); ++c) {
-    const float w = own[c / 3].w;
-    mesh.tangents[c] = w == 0 ? Vec4(0, 0, 0, 1) : Vec4(shared[keyOf(c, w)], w);
-  }
-}
 
 /// False where a position or UV is not finite.
 bool append(FlatMesh& mesh, const Primitive& primitive, const Mat4& world, int uvSet, bool& hasTangents) {
@@ -95,7 +55,11 @@ Expected<FlatMesh> flatten(const Scene& scene, int uvSet, const std::string& wha
     mesh.lowest = glm::min(mesh.lowest, p);
     mesh.highest = glm::max(mesh.highest, p);
   }
-  if (uvSet >= 0 && !hasTangents) makeTangents(mesh);
+  if (uvSet >= 0 && !hasTangents) {
+    std::vector<std::uint32_t> corners(mesh.positions.size());
+    std::iota(corners.begin(), corners.end(), 0u);
+    mesh.tangents = cornerTangents(mesh.positions, mesh.normals, mesh.uvs, corners);
+  }
   return mesh;
 }
 

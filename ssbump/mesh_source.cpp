@@ -17,10 +17,10 @@ constexpr std::size_t kPacket = 16;
 struct Target {
   FlatMesh mesh;
   EmbreeDevice device;
-  EmbreeScene single;    // the mesh once: what the texels' own rays look for
-  EmbreeScene repeated;  // for occlusion; null: `single`
+  EmbreeScene single;    // the mesh once
+  EmbreeScene repeated;  // null: the mesh does not repeat
 
-  RTCScene forOcclusion() const { return repeated ? repeated.get() : single.get(); }
+  RTCScene scene() const { return repeated ? repeated.get() : single.get(); }
 };
 
 EmbreeGeometry triangleGeometry(RTCDevice device, const FlatMesh& mesh) {
@@ -93,13 +93,15 @@ Found project(const Target& target, const SurfaceTexel& texel, float front, floa
   RTCRayHit ray{};
   ray.ray = {origin.x, origin.y, origin.z, 0, direction.x, direction.y, direction.z, 0, front + back, ~0u, 0, 0};
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(target.single.get(), &context, &ray);
+  rtcIntersect1(target.scene(), &context, &ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
   const std::size_t c = static_cast<std::size_t>(ray.hit.primID) * 3;
   const float u = ray.hit.u, v = ray.hit.v;
   const FlatMesh& m = target.mesh;
   Found found{true, {}, {}, {}};
   found.p = (1 - u - v) * m.positions[c] + u * m.positions[c + 1] + v * m.positions[c + 2];
+  // A repeat lies whole periods away in x and z, across the ray, which runs along y there.
+  if (target.repeated) found.p = Vec3(origin.x, found.p.y, origin.z);
   const Vec3 face = glm::cross(m.positions[c + 1] - m.positions[c], m.positions[c + 2] - m.positions[c]);
   found.geometricNormal = glm::normalize(glm::dot(face, direction) > 0 ? -face : face);
   const Vec3 smooth = (1 - u - v) * m.normals[c] + u * m.normals[c + 1] + v * m.normals[c + 2];
@@ -129,7 +131,7 @@ void gatherTexel(const Target& target, const SurfaceTexel& texel, const Found& f
       rays.tfar[i] = std::numeric_limits<float>::infinity();
       rays.mask[i] = ~0u;
     }
-    rtcOccluded16(valid.data(), target.forOcclusion(), &context, &rays);
+    rtcOccluded16(valid.data(), target.scene(), &context, &rays);
     for (std::size_t i = 0; i < kPacket; ++i)
       for (std::size_t c = 0; valid[i] && c < lobes.size(); ++c) {
         const double w = static_cast<double>(lobeWeight(lobes[c], local[i]));
