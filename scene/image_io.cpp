@@ -6,7 +6,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <cmath>
+#include <cstdio>
+#include <cstring>
 #include <system_error>
 
 #include "scene/check.h"
@@ -97,6 +100,7 @@ Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std
 struct ImageWriter::State {
   std::filesystem::path file, temporary;
   std::unique_ptr<OIIO::ImageOutput> output;
+  OIIO::ImageSpec spec;
   PixelFormat format = PixelFormat::Float;
   int width = 0, height = 0, channels = 0, nextRow = 0;
   bool committed = false;
@@ -105,7 +109,8 @@ struct ImageWriter::State {
   Error failed(const std::string& why) const { return failure(name() + ": cannot be written: " + why); }
   ~State() {
     if (committed) return;
-    if (output) output->close();
+    if (nextRow > 0) output->close();
+    output.reset();
     std::error_code ec;
     std::filesystem::remove(temporary, ec);
   }
@@ -138,7 +143,11 @@ Expected<ImageWriter> ImageWriter::open(const std::filesystem::path& file, int w
   state->width = width;
   state->height = height;
   state->channels = channels;
-  if (!state->output->open(state->temporary.string(), spec)) return state->failed(state->output->geterror());
+  state->spec = std::move(spec);
+  // The encoder opens with the first rows (libpng complains aloud about a file without any), so try the place itself now.
+  std::FILE* trial = std::fopen(state->temporary.c_str(), "wb");
+  if (!trial) return state->failed(std::strerror(errno));
+  std::fclose(trial);
   return ImageWriter(std::move(state));
 }
 
@@ -156,6 +165,7 @@ Expected<void> ImageWriter::write(const Image& rows) {
     if (s.format == PixelFormat::Half && std::abs(v) > 65504.0f)
       return failure(where() + " is " + std::to_string(v) + ", beyond half's 65504; write float");
   }
+  if (s.nextRow == 0 && !s.output->open(s.temporary.string(), s.spec)) return s.failed(s.output->geterror());
   const bool whole = s.nextRow == 0 && rows.height == s.height;
   const bool written = whole ? s.output->write_image(OIIO::TypeDesc::FLOAT, rows.pixels.data())
                              : s.output->write_scanlines(s.nextRow, s.nextRow + rows.height, 0, OIIO::TypeDesc::FLOAT,

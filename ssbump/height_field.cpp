@@ -48,11 +48,11 @@ Expected<void> parseHeightScale(const std::string& text, HeightOptions& options)
 
 Expected<int> findChannel(const LoadedImage& image, const std::string& channel, const std::string& name) {
   if (channel.empty()) return 0;
-  const std::string wanted = lowerCase(channel);
+  std::string wanted = lowerCase(channel);
+  if (wanted == "red" || wanted == "green" || wanted == "blue" || wanted == "alpha") wanted.resize(1);
   std::string known;
   for (std::size_t i = 0; i < image.channelNames.size(); ++i) {
-    const std::string have = lowerCase(image.channelNames[i]);
-    if (have == wanted || (wanted.size() == 1 && have.size() > 1 && have[0] == wanted[0])) return static_cast<int>(i);
+    if (lowerCase(image.channelNames[i]) == wanted) return static_cast<int>(i);
     known += (i ? ", " : "") + image.channelNames[i];
   }
   if (wanted == "luminance" && image.image.channels >= 3) return -1;

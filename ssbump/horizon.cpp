@@ -141,10 +141,10 @@ Horizon::Horizon(const HeightField& field, const HorizonSettings& settings) : se
 Image Horizon::occlusion(const TexelRect& rect, std::span<const Lobe> lobes) const {
   const int levelsUsed = levelCount(settings_.reach);
   std::vector<Slice> slices;
-  std::vector<double> open(lobes.size(), 0.0);
+  std::vector<float> open(lobes.size(), 0.0f);  // summed as the kernel sums: flat gives exactly 1
   for (int j = 0; j < settings_.azimuths; ++j) {
     slices.push_back(makeSlice(sliceAzimuth(j, settings_.azimuths), settings_.reach, levelsUsed, lobes));
-    for (std::size_t c = 0; c < lobes.size(); ++c) open[c] += static_cast<double>(slices.back().lobes[c].open);
+    for (std::size_t c = 0; c < lobes.size(); ++c) open[c] += slices.back().lobes[c].open;
   }
   std::vector<MaxLevel> levels;
   for (int level = 0; level <= levelsUsed; ++level) {
@@ -182,10 +182,9 @@ Image Horizon::occlusion(const TexelRect& rect, std::span<const Lobe> lobes) con
         horizonRow(row, settings_.simd);
       }
       for (std::size_t c = 0; c < lobes.size(); ++c) {
-        const float scale = open[c] > 0 ? static_cast<float>(1 / open[c]) : 0.0f;
         float* o = out.pixels.data() + y * width * lobes.size() + c;
         for (std::size_t x = 0; x < width; ++x)
-          o[x * lobes.size()] = open[c] > 0 ? std::clamp(sumRows[c][x] * scale, 0.0f, 1.0f) : 1.0f;
+          o[x * lobes.size()] = open[c] > 0 ? std::clamp(sumRows[c][x] / open[c], 0.0f, 1.0f) : 1.0f;
       }
     }
   });

@@ -85,13 +85,11 @@ struct Found {
   Vec3 p{0}, shadingNormal{0}, geometricNormal{0};
 };
 
-/// The mesh's outermost surface along the texel's normal, from `front` above to `back` below.
-Found project(const Target& target, const SurfaceTexel& texel, float front, float back) {
+Found projectFrom(const Target& target, const Vec3& origin, const Vec3& direction, float length) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  const Vec3 origin = texel.p + texel.frame.n * front, direction = -texel.frame.n;
   RTCRayHit ray{};
-  ray.ray = {origin.x, origin.y, origin.z, 0, direction.x, direction.y, direction.z, 0, front + back, ~0u, 0, 0};
+  ray.ray = {origin.x, origin.y, origin.z, 0, direction.x, direction.y, direction.z, 0, length, ~0u, 0, 0};
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(target.scene(), &context, &ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
@@ -108,6 +106,18 @@ Found project(const Target& target, const SurfaceTexel& texel, float front, floa
   found.shadingNormal = glm::length(smooth) > 1e-6f ? glm::normalize(smooth) : found.geometricNormal;
   if (glm::dot(found.shadingNormal, found.geometricNormal) < 0) found.shadingNormal = -found.shadingNormal;
   return found;
+}
+
+/// The mesh's outermost surface along the texel's normal, from `front` above to `back` below. A ray that slips between a
+/// mesh's border and its own repeat, or past a border that it should meet, is moved by a hundred-thousandth of the mesh.
+Found project(const Target& target, const SurfaceTexel& texel, float front, float back) {
+  const Vec3 origin = texel.p + texel.frame.n * front;
+  const float nudge = 1e-5f * target.mesh.diagonal();
+  for (const auto& [dt, db] : {std::pair{0.0f, 0.0f}, {1.0f, 1.0f}, {-1.0f, -1.0f}, {1.0f, -1.0f}, {-1.0f, 1.0f}}) {
+    const Found found = projectFrom(target, origin + nudge * (dt * texel.frame.t + db * texel.frame.b), -texel.frame.n, front + back);
+    if (found.hit) return found;
+  }
+  return {};
 }
 
 /// Gathers one texel: rays in packets of sixteen from one point.

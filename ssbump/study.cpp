@@ -46,25 +46,19 @@ Image dropAlpha(const Image& in) {
   return mapTexels(in, [](const Vec3& s) { return s; });
 }
 
-/// Luma in the alpha block, whose eight levels are its own; the two chroma differences in the colour block.
-Image throughYCoCg(const Image& in) {
+/// One weight in the alpha block, whose eight levels are its own; the colour block's line is left with two.
+Image throughSplit(const Image& in) {
   Image packed(in.width, in.height, 4);
   for (int y = 0; y < in.height; ++y)
     for (int x = 0; x < in.width; ++x) {
       const Vec3 s = in.rgb(x, y);
-      const float luma = (s.x + 2 * s.y + s.z) / 4, co = (s.x - s.z) / 2, cg = (2 * s.y - s.x - s.z) / 4;
-      float* p = packed.at(x, y);
-      p[0] = co + 0.5f, p[1] = cg + 0.5f, p[2] = 0, p[3] = luma;
+      const Vec4 texel(s.x, s.z, 0, s.y);
+      std::copy_n(&texel.x, 4, packed.at(x, y));
     }
   const Image back = throughBlocks(packed, BlockFormat::Bc3);
   Image out(in.width, in.height, 3);
   for (int y = 0; y < in.height; ++y)
-    for (int x = 0; x < in.width; ++x) {
-      const float* p = back.at(x, y);
-      // 0.5 is no 8-bit value: the packed zero is 128/255.
-      const float co = p[0] - 128.0f / 255, cg = p[1] - 128.0f / 255, luma = p[3];
-      out.setRgb(x, y, glm::max(Vec3(luma + co - cg, luma + cg, luma - co - cg), Vec3(0.0f)));
-    }
+    for (int x = 0; x < in.width; ++x) out.setRgb(x, y, {back.at(x, y)[0], back.at(x, y)[3], back.at(x, y)[1]});
   return out;
 }
 
@@ -92,8 +86,9 @@ std::vector<Format> formats() {
           {"RGB565", 16, Convention::Squared, rgb565},
           {"RGB565 linear", 16, Convention::Linear, rgb565},
           {"BC5 + BC4", 12, Convention::Squared, throughThreeBlocks},
-          {"BC3 YCoCg", 8, Convention::Squared, throughYCoCg},
-          {"BC3 YCoCg linear", 8, Convention::Linear, throughYCoCg},
+          {"BC5 + BC4 linear", 12, Convention::Linear, throughThreeBlocks},
+          {"BC3 split", 8, Convention::Squared, throughSplit},
+          {"BC3 split linear", 8, Convention::Linear, throughSplit},
           {"BC1", 4, Convention::Squared, bc1},
           {"BC1 linear", 4, Convention::Linear, bc1}};
 }

@@ -21,8 +21,8 @@ struct StudyRow {
 };
 
 /// Formats: RGB8 and RGB565, in squared and in linear weights (the square roots spread small weights over more steps);
-/// BC1 in both; BC3 holding YCoCg with the luma in the alpha block (van Waveren and Castano 2007), 8 bits per texel as
-/// BC7 has; BC5 + BC4, one 4-bit block per weight. libsquish has no BC7.
+/// BC1 in both; BC3 split (one weight in the alpha block, two in the colour block), 8 bits per texel as BC7 has;
+/// BC5 + BC4, one 4-bit block per weight. Neither libsquish nor NVTT 2.0 has BC7.
 /// `map`: squared weights, right-handed, three channels. Mips 0 to `lastMip` (box filter).
 std::vector<StudyRow> studyFormats(const Image& map, int lastMip);
 
