@@ -329,6 +329,23 @@ class OverlapGrid {
 
 }  // namespace
 
+bool packsWell(Vec2d size, double area, double largestSide) {
+  constexpr double kLargeShare = 0.05;  // of the page, by the box
+  constexpr double kEmptyShare = 0.3;   // of the box
+  if (std::max(size.x, size.y) > largestSide) return false;
+  const double box = size.x * size.y;
+  return box < kLargeShare * largestSide * largestSide || area > kEmptyShare * box;
+}
+
+bool packsWell(std::span<const Vec2d> uvs, double area, double largestSide) {
+  Vec2d low = uvs[0], high = uvs[0];
+  for (const Vec2d uv : uvs) {
+    low = glm::min(low, uv);
+    high = glm::max(high, uv);
+  }
+  return packsWell(high - low, area, largestSide);
+}
+
 bool overlapsItself(const ChartMesh& chart, std::span<const Vec2d> uvs, double tolerance) {
   return chart.triangles.size() > 1 && OverlapGrid(chart, uvs, tolerance).anyOverlap();
 }

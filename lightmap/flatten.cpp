@@ -226,15 +226,6 @@ bool relax(const ChartMesh& chart, std::vector<Vec2d>& uvs, const FlattenOptions
   return isGood(chart, uvs, options);
 }
 
-bool fits(std::span<const Vec2d> uvs, double largestSide) {
-  Vec2d low = uvs[0], high = uvs[0];
-  for (const Vec2d uv : uvs) {
-    low = glm::min(low, uv);
-    high = glm::max(high, uv);
-  }
-  return std::max(high.x - low.x, high.y - low.y) <= largestSide;
-}
-
 }  // namespace
 
 Flattening flatten(const ChartMesh& chart, const FlattenOptions& options) {
@@ -264,7 +255,7 @@ Flattening flatten(const ChartMesh& chart, const FlattenOptions& options) {
     if (!good || overlapsItself(chart, result.uvs, kOverlapTexels)) return result;
   }
   alignToAxes(chart, result.uvs);
-  result.valid = fits(result.uvs, options.largestSide);
+  result.valid = packsWell(result.uvs, surfaceArea(chart), options.largestSide);
   return result;
 }
 
