@@ -13,6 +13,7 @@ constexpr double kThinTexels = 0.01;      // triangles thinner than this may sta
 constexpr double kOverlapTexels = 2e-3;   // parts may lie on each other by less: far below a sample's distance
 constexpr double kMaxBadShare = 0.004;    // of a chart's surface, beyond the stretch limit
 constexpr double kMaxL2 = 1.03;
+constexpr double kSettledTexels = 0.01;   // root mean square: a relaxation that moves less has arrived
 constexpr int kMaxIterations = 30;
 
 Vec3d chartNormal(const ChartMesh& chart) {
@@ -179,7 +180,7 @@ class RigidRelaxation {
       cosine += weight[k] * glm::dot(e[k], now);
       sine += weight[k] * cross2(e[k], now);
     }
-    const double length = std::hypot(cosine, sine);
+    const double length = std::sqrt(cosine * cosine + sine * sine);
     if (length > 0) {
       cosine /= length;
       sine /= length;
@@ -220,7 +221,7 @@ bool relax(const ChartMesh& chart, std::vector<Vec2d>& uvs, const FlattenOptions
   for (int i = 0; i < kMaxIterations; ++i) {
     const double moved = relaxation.step(uvs);
     if (moved < 0) return false;
-    if (moved < 0.01) break;  // texels
+    if (moved < kSettledTexels) break;
   }
   scaleToSurface(chart, uvs);
   return isGood(chart, uvs, options);
