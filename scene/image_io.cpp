@@ -116,6 +116,8 @@ Expected<void> writeImage(const std::filesystem::path& file, const Image& image,
   spec.attribute("oiio:UnassociatedAlpha", 1);
   if (std::string_view(output->format_name()) == "openexr") spec.attribute("compression", "zip");
   for (const auto& [key, value] : options.metadata) spec.attribute(key, value);
+  // OpenImageIO adds the time of day to an EXR that has no DateTime, and equal images would be unequal files.
+  if (std::string_view(output->format_name()) == "openexr") spec.attribute("DateTime", "");
 
   const auto temporary = file.parent_path() / ("." + file.stem().string() + "." + std::to_string(getpid()) + ".part" +
                                                file.extension().string());
