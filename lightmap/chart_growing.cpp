@@ -169,7 +169,6 @@ class Grower {
     into.node = static_cast<std::uint32_t>(tree_.triangleCount + tree_.merges.size() - 1);
     from.alive = false;
     borders_[borderIndex].alive = false;
-    borderOf_.erase(key(keep, drop));
     for (const std::uint32_t moved : from.borders) moveBorder(moved, drop, keep);
     from.borders = {};
   }
@@ -178,7 +177,6 @@ class Grower {
     Border& border = borders_[moved];
     if (!border.alive) return;
     const std::uint32_t other = border.a == from ? border.b : border.a;
-    borderOf_.erase(key(from, other));
     const auto [place, isNew] = borderOf_.try_emplace(key(to, other), moved);
     if (isNew) {
       border.a = to;
@@ -213,7 +211,7 @@ class Grower {
   const GrowOptions& options_;
   std::vector<Region> regions_;
   std::vector<Border> borders_;
-  std::unordered_map<std::uint64_t, std::uint32_t> borderOf_;  // looked up only, never iterated
+  std::unordered_map<std::uint64_t, std::uint32_t> borderOf_;  // looked up only; keys of merged regions are left behind
   std::priority_queue<Candidate> queue_;
   MergeTree tree_;
 };

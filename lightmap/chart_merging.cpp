@@ -163,7 +163,6 @@ class PartMerger {
     members_[into].insert(members_[into].end(), members_[from].begin(), members_[from].end());
     members_[from].clear();
     borders_[index].alive = false;
-    borderOf_.erase(key(into, from));
     for (const std::uint32_t moved : bordersOf_[from]) moveBorder(moved, from, into);
     bordersOf_[from].clear();
     // What was refused may fit the grown chart.
@@ -175,7 +174,6 @@ class PartMerger {
     Border& border = borders_[moved];
     if (!border.alive) return;
     const std::uint32_t other = border.a == from ? border.b : border.a;
-    borderOf_.erase(key(from, other));
     const auto [place, isNew] = borderOf_.try_emplace(key(to, other), moved);
     if (isNew) {
       border.a = to;
@@ -218,7 +216,7 @@ class PartMerger {
   std::vector<Border> borders_;
   std::vector<std::vector<std::uint32_t>> bordersOf_;  // per chart
   std::vector<std::vector<std::uint32_t>> members_;    // per chart: the charts that it is made of
-  std::unordered_map<std::uint64_t, std::uint32_t> borderOf_;  // looked up only
+  std::unordered_map<std::uint64_t, std::uint32_t> borderOf_;  // looked up only; keys of merged charts are left behind
   std::priority_queue<Candidate> queue_;
 };
 

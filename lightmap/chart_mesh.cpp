@@ -7,8 +7,8 @@
 namespace lumel {
 namespace {
 
-// A float UV on a page of some thousand texels is known to about 1e-4 texels: thinner flips do not exist in the result.
-constexpr double kFlipTexels = 1e-4;
+// A float UV on a page of some thousand texels is known to about 5e-5 texels: thinner flips do not exist in the result.
+constexpr double kFlipTexels = 5e-5;
 
 std::uint32_t findRoot(std::vector<std::uint32_t>& parent, std::uint32_t x) {
   while (parent[x] != x) x = parent[x] = parent[parent[x]];
@@ -328,6 +328,23 @@ class OverlapGrid {
 };
 
 }  // namespace
+
+bool packsWell(Vec2d size, double area, double largestSide) {
+  constexpr double kLargeShare = 0.05;  // of the page, by the box
+  constexpr double kEmptyShare = 0.3;   // of the box
+  if (std::max(size.x, size.y) > largestSide) return false;
+  const double box = size.x * size.y;
+  return box < kLargeShare * largestSide * largestSide || area > kEmptyShare * box;
+}
+
+bool packsWell(std::span<const Vec2d> uvs, double area, double largestSide) {
+  Vec2d low = uvs[0], high = uvs[0];
+  for (const Vec2d uv : uvs) {
+    low = glm::min(low, uv);
+    high = glm::max(high, uv);
+  }
+  return packsWell(high - low, area, largestSide);
+}
 
 bool overlapsItself(const ChartMesh& chart, std::span<const Vec2d> uvs, double tolerance) {
   return chart.triangles.size() > 1 && OverlapGrid(chart, uvs, tolerance).anyOverlap();

@@ -58,6 +58,11 @@ void scaleToSurface(const ChartMesh& chart, std::vector<Vec2d>& uvs);
 /// Turns the chart so that its dominant border direction, else its smallest rectangle, is along the axes.
 void alignToAxes(const ChartMesh& chart, std::vector<Vec2d>& uvs);
 
+/// Whether a chart of this box and area (texels) is no longer than a page and, if it takes a good part of one, no thin
+/// ring or long bow whose box is mostly empty.
+bool packsWell(Vec2d size, double area, double largestSide);
+bool packsWell(std::span<const Vec2d> uvs, double area, double largestSide);
+
 /// Whether parts of the chart lie on each other by more than `tolerance` texels.
 bool overlapsItself(const ChartMesh& chart, std::span<const Vec2d> uvs, double tolerance);
 

@@ -263,7 +263,7 @@ bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const RigidMoti
       if (hit) return false;
     }
   }
-  return std::max(high.x - low.x, high.y - low.y) <= options.largestSide;
+  return packsWell(high - low, target.normals.area + moved.normals.area, options.largestSide);
 }
 
 void ChartSheet::join(std::uint32_t into, std::uint32_t from, const RigidMotion& motion, const std::vector<MeshEdge>& matched) {

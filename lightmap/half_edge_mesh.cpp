@@ -9,7 +9,7 @@ namespace lumel {
 namespace {
 
 constexpr double kDegenerateArea = 1e-12;  // of the longest edge's square: below the rounding of float coordinates
-constexpr float kFrameCos = 0.9986f;       // tangents more than 3 degrees apart are two frames
+constexpr float kFrameCos = 0.9965f;       // tangents more than 4.8 degrees apart are two frames
 constexpr float kHardCos = 0.9986f;
 constexpr double kFoldCos = -0.5;  // sheets of a non-manifold edge are paired unless they fold back on each other
 
@@ -82,6 +82,9 @@ class Builder {
       }
       mesh_.sourceTriangle.push_back(t);
       normals_.push_back(Vec3(areaNormal / (2 * area)));
+      bool back = true;
+      for (std::size_t k = 0; k < 3; ++k) back = back && glm::dot(soup_.normals[v[k]], normals_.back()) < 0;
+      shadedFromBehind_.push_back(back);
     }
   }
 
@@ -90,6 +93,8 @@ class Builder {
     const std::uint32_t a[2] = {vertexAt(cornerA), vertexAt(nextCorner(cornerA))};
     const std::uint32_t b[2] = {vertexAt(nextCorner(cornerB)), vertexAt(cornerB)};
     hard = false;
+    // Normals are turned to the front as a whole triangle's: beside one that is not, the frame turns over.
+    if (shadedFromBehind_[cornerA / 3] != shadedFromBehind_[cornerB / 3]) return false;
     for (int i = 0; i < 2; ++i) {
       if (a[i] == b[i]) continue;
       if (glm::dot(soup_.normals[a[i]], soup_.normals[b[i]]) < kHardCos) hard = true;
@@ -260,6 +265,7 @@ class Builder {
   const TriangleSoup& soup_;
   std::vector<std::uint32_t> welded_;
   std::vector<Vec3> normals_;            // per kept triangle
+  std::vector<bool> shadedFromBehind_;   // per kept triangle: all its normals point away from its front
   std::vector<std::int32_t> opposite_;   // per corner: the corner of the paired side, or -1
   std::vector<std::uint32_t> fan_;       // per corner: union-find over corners joined around a point
   HalfEdgeMesh mesh_;
