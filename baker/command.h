@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <iosfwd>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -14,6 +15,7 @@ namespace lumel {
 /// What a running subcommand may use of the outside.
 struct CommandContext {
   Progress& progress;
+  std::ostream& out;                // standard output: what the user asked to see
   bool quiet = false;               // nothing on stderr but errors
   nlohmann::ordered_json settings;  // every option of the subcommand as resolved
 };

@@ -53,6 +53,9 @@ class OptionTable {
   Option& integer(const std::string& name, int& target, Range<int> range, const std::string& help);
   Option& integer(const std::string& name, std::uint64_t& target, const std::string& help);
   Option& number(const std::string& name, float& target, Range<float> range, const std::string& help);
+  /// Empty unless given.
+  Option& optionalNumber(const std::string& name, std::optional<float>& target, Range<float> range,
+                         const std::string& help);
   Option& color(const std::string& name, Vec3& target, Range<float> range, const std::string& help);
   Option& vector(const std::string& name, std::optional<Vec3>& target, const std::string& help);
   Option& text(const std::string& name, std::string& target, const std::string& help);

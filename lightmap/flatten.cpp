@@ -201,8 +201,9 @@ class RigidRelaxation {
 };
 
 bool isGood(const ChartMesh& chart, std::span<const Vec2d> uvs, const FlattenOptions& options) {
-  const Stretch stretch = measureStretch(chart, uvs, options.maxStretch);
-  return stretch.flipped == 0 && stretch.badShare <= kMaxBadShare && stretch.l2 <= kMaxL2;
+  const double slack = smallChartSlack(surfaceArea(chart));
+  const Stretch stretch = measureStretch(chart, uvs, options.maxStretch * std::sqrt(slack));
+  return stretch.flipped == 0 && stretch.badShare <= kMaxBadShare * slack && stretch.l2 <= 1 + (kMaxL2 - 1) * slack;
 }
 
 /// Whether unrolling alone was as good as isometric.

@@ -10,7 +10,7 @@ constexpr int kPointsPerTexel = 4;  // per axis
 constexpr std::size_t kUvSet = 1;
 constexpr float kRangeTolerance = 1e-5f;       // of the page: rounding of normalised 16-bit UVs
 constexpr double kOverlapShare = 0.001;
-constexpr double kOverlapTexels = 4.0;
+constexpr double kOverlapTexels = 16.0;
 constexpr double kLostSurfaceShare = 0.01;     // surface that the UVs leave without area
 
 /// Sample points of a page; triangles are marked with the half-open rule.

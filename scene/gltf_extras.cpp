@@ -1,5 +1,6 @@
 #include "scene/gltf_extras.h"
 
+#include <algorithm>
 #include <cfloat>
 
 namespace lumel {
@@ -22,6 +23,13 @@ std::optional<std::string> readObjectSettings(const tinygltf::Value& extras, Obj
     }
   }
   return std::nullopt;
+}
+
+int readLightmapPage(const tinygltf::Value& extras) {
+  if (!extras.IsObject() || !extras.Has("lumel")) return -1;
+  const auto& lumel = extras.Get("lumel");
+  if (!lumel.IsObject() || !lumel.Has("page") || !lumel.Get("page").IsInt()) return -1;
+  return std::max(-1, lumel.Get("page").Get<int>());
 }
 
 }  // namespace lumel

@@ -7,6 +7,7 @@
 
 #include "scene/gltf_accessor.h"
 #include "scene/gltf_attributes.h"
+#include "scene/gltf_extras.h"
 #include "scene/gltf_skin.h"
 #include "scene/parallel.h"
 #include "scene/triangles.h"
@@ -65,6 +66,7 @@ std::optional<Error> load(const GltfDocument& document, const MeshUse& use, cons
   primitive.name = "mesh '" + (mesh.name.empty() ? std::to_string(use.mesh) : mesh.name) + "' primitive " +
                    std::to_string(job.primitive);
   primitive.material = source.material >= 0 ? source.material : static_cast<int>(scene.materials.size()) - 1;
+  primitive.lightmapPage = readLightmapPage(source.extras);
   if (source.mode < TINYGLTF_MODE_TRIANGLES) {
     job.report.skippedPrimitives = 1;
     return std::nullopt;

@@ -6,8 +6,13 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <cmath>
+#include <cstdio>
+#include <cstring>
 #include <system_error>
+
+#include "scene/check.h"
 
 namespace lumel {
 namespace {
@@ -92,49 +97,100 @@ Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std
   return readOpened(*input, name);
 }
 
-Expected<void> writeImage(const std::filesystem::path& file, const Image& image, const WriteImageOptions& options) {
-  const std::string name = file.string();
-  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
-    const float v = image.pixels[i];
-    const auto where = [&] {
-      const std::size_t pixel = i / static_cast<std::size_t>(image.channels);
-      return name + ": pixel (" + std::to_string(pixel % static_cast<std::size_t>(image.width)) + ", " +
-             std::to_string(pixel / static_cast<std::size_t>(image.width)) + ")";
-    };
-    if (std::isnan(v)) return failure(where() + " is not a number");
-    if (options.format == PixelFormat::Half && std::abs(v) > 65504.0f)
-      return failure(where() + " is " + std::to_string(v) + ", beyond half's 65504; write float");
+struct ImageWriter::State {
+  std::filesystem::path file, temporary;
+  std::unique_ptr<OIIO::ImageOutput> output;
+  OIIO::ImageSpec spec;
+  PixelFormat format = PixelFormat::Float;
+  int width = 0, height = 0, channels = 0, nextRow = 0;
+  bool committed = false;
+
+  std::string name() const { return file.string(); }
+  Error failed(const std::string& why) const { return failure(name() + ": cannot be written: " + why); }
+  ~State() {
+    if (committed) return;
+    if (nextRow > 0) output->close();
+    output.reset();
+    std::error_code ec;
+    std::filesystem::remove(temporary, ec);
   }
+};
+
+ImageWriter::ImageWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
+ImageWriter::ImageWriter(ImageWriter&&) noexcept = default;
+ImageWriter& ImageWriter::operator=(ImageWriter&&) noexcept = default;
+ImageWriter::~ImageWriter() = default;
+
+Expected<ImageWriter> ImageWriter::open(const std::filesystem::path& file, int width, int height, int channels,
+                                        const WriteImageOptions& options) {
+  const std::string name = file.string();
   const OIIO::TypeDesc type = options.format == PixelFormat::U8     ? OIIO::TypeDesc::UINT8
                               : options.format == PixelFormat::U16  ? OIIO::TypeDesc::UINT16
                               : options.format == PixelFormat::Half ? OIIO::TypeDesc::HALF
                                                                     : OIIO::TypeDesc::FLOAT;
-  auto output = OIIO::ImageOutput::create(name);
-  if (!output) return usageError(name + ": unknown image type; use .exr, .png, .tga, .tif or .hdr");
-  OIIO::ImageSpec spec(image.width, image.height, image.channels, type);
+  auto state = std::make_unique<State>();
+  state->output = OIIO::ImageOutput::create(name);
+  if (!state->output) return usageError(name + ": unknown image type; use .exr, .png, .tga, .tif or .hdr");
+  OIIO::ImageSpec spec(width, height, channels, type);
   if (!options.channelNames.empty()) spec.channelnames = options.channelNames;
   spec.attribute("oiio:UnassociatedAlpha", 1);
-  if (std::string_view(output->format_name()) == "openexr") spec.attribute("compression", "zip");
+  if (std::string_view(state->output->format_name()) == "openexr") spec.attribute("compression", "zip");
   for (const auto& [key, value] : options.metadata) spec.attribute(key, value);
+  state->file = file;
+  state->temporary = file.parent_path() /
+                     ("." + file.stem().string() + "." + std::to_string(getpid()) + ".part" + file.extension().string());
+  state->format = options.format;
+  state->width = width;
+  state->height = height;
+  state->channels = channels;
+  state->spec = std::move(spec);
+  // The encoder opens with the first rows (libpng complains aloud about a file without any), so try the place itself now.
+  std::FILE* trial = std::fopen(state->temporary.c_str(), "wb");
+  if (!trial) return state->failed(std::strerror(errno));
+  std::fclose(trial);
+  return ImageWriter(std::move(state));
+}
 
-  const auto temporary = file.parent_path() / ("." + file.stem().string() + "." + std::to_string(getpid()) + ".part" +
-                                               file.extension().string());
-  const auto abandon = [&](const std::string& why) -> Error {
-    std::error_code ec;
-    std::filesystem::remove(temporary, ec);
-    return failure(name + ": cannot be written: " + why);
-  };
-  if (!output->open(temporary.string(), spec)) return abandon(output->geterror());
-  if (!output->write_image(OIIO::TypeDesc::FLOAT, image.pixels.data())) {
-    const std::string why = output->geterror();
-    output->close();
-    return abandon(why);
+Expected<void> ImageWriter::write(const Image& rows) {
+  State& s = *state_;
+  LUMEL_CHECK(rows.width == s.width && rows.channels == s.channels && s.nextRow + rows.height <= s.height);
+  for (std::size_t i = 0; i < rows.pixels.size(); ++i) {
+    const float v = rows.pixels[i];
+    const auto where = [&] {
+      const std::size_t pixel = i / static_cast<std::size_t>(s.channels), width = static_cast<std::size_t>(s.width);
+      return s.name() + ": pixel (" + std::to_string(pixel % width) + ", " +
+             std::to_string(pixel / width + static_cast<std::size_t>(s.nextRow)) + ")";
+    };
+    if (std::isnan(v)) return failure(where() + " is not a number");
+    if (s.format == PixelFormat::Half && std::abs(v) > 65504.0f)
+      return failure(where() + " is " + std::to_string(v) + ", beyond half's 65504; write float");
   }
-  if (!output->close()) return abandon(output->geterror());
-  std::error_code ec;
-  std::filesystem::rename(temporary, file, ec);
-  if (ec) return abandon(ec.message());
+  if (s.nextRow == 0 && !s.output->open(s.temporary.string(), s.spec)) return s.failed(s.output->geterror());
+  const bool whole = s.nextRow == 0 && rows.height == s.height;
+  const bool written = whole ? s.output->write_image(OIIO::TypeDesc::FLOAT, rows.pixels.data())
+                             : s.output->write_scanlines(s.nextRow, s.nextRow + rows.height, 0, OIIO::TypeDesc::FLOAT,
+                                                         rows.pixels.data());
+  if (!written) return s.failed(s.output->geterror());
+  s.nextRow += rows.height;
   return {};
+}
+
+Expected<void> ImageWriter::commit() {
+  State& s = *state_;
+  LUMEL_CHECK(s.nextRow == s.height);
+  if (!s.output->close()) return s.failed(s.output->geterror());
+  std::error_code ec;
+  std::filesystem::rename(s.temporary, s.file, ec);
+  if (ec) return s.failed(ec.message());
+  s.committed = true;
+  return {};
+}
+
+Expected<void> writeImage(const std::filesystem::path& file, const Image& image, const WriteImageOptions& options) {
+  auto writer = ImageWriter::open(file, image.width, image.height, image.channels, options);
+  if (!writer) return writer.error();
+  if (auto done = writer->write(image); !done) return done;
+  return writer->commit();
 }
 
 Expected<std::vector<std::uint8_t>> encodePng(const Image& image) {

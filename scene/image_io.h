@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -42,6 +43,27 @@ struct WriteImageOptions {
 /// half a file. Values are stored as they are (no colour conversion). Errors: Failed (cannot write), Usage (unknown
 /// extension or a value that the format cannot hold: a finite value beyond 65504 with Half, a NaN anywhere).
 Expected<void> writeImage(const std::filesystem::path& file, const Image& image, const WriteImageOptions& options = {});
+
+/// The same in parts, for images that do not fit in memory: rows from the top down, then commit. Without commit nothing
+/// is left behind.
+class ImageWriter {
+ public:
+  static Expected<ImageWriter> open(const std::filesystem::path& file, int width, int height, int channels,
+                                    const WriteImageOptions& options = {});
+  ImageWriter(ImageWriter&&) noexcept;
+  ImageWriter& operator=(ImageWriter&&) noexcept;
+  ~ImageWriter();
+
+  /// The next rows.height rows, `rows` as wide and deep as the file.
+  Expected<void> write(const Image& rows);
+  /// Completes the file and puts it in place. Every row must have been written.
+  Expected<void> commit();
+
+ private:
+  struct State;
+  explicit ImageWriter(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
 
 /// Encodes as PNG (8-bit) in memory, for embedding.
 Expected<std::vector<std::uint8_t>> encodePng(const Image& image);

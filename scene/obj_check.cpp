@@ -47,11 +47,10 @@ std::optional<std::string> checkNumbers(std::string_view line, int kind) {
     std::string_view token = nextToken(line);
     if (token.empty()) return std::string("a ") + kKinds[static_cast<std::size_t>(kind)] + " with too few numbers";
     if (token.front() == '+') token.remove_prefix(1);
-    float value = 0;
+    double value = 0;
     const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), value);
-    const bool tiny = error == std::errc::result_out_of_range && std::abs(value) < 1;
-    if ((error != std::errc() && !tiny) || end != token.data() + token.size() || !std::isfinite(value) ||
-        std::abs(value) > 1e18f)
+    if (error != std::errc() || end != token.data() + token.size() || !std::isfinite(value) ||
+        std::abs(value) > 1e18)
       return std::string("a ") + kKinds[static_cast<std::size_t>(kind)] + " with '" + std::string(token.substr(0, 40)) +
              "', which is not a finite number below 1e18";
   }

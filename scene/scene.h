@@ -25,6 +25,7 @@ struct Primitive {
   std::vector<Vec4> colors;                 // COLOR_0, linear, alpha 1 where the file has RGB
   std::vector<std::uint32_t> indices;       // three per triangle, counter-clockwise from the front
   int material = 0;                         // into Scene::materials; always valid
+  int lightmapPage = -1;                    // extras.lumel.page of the primitive: its lightmap, on TEXCOORD_1; -1 = none
 
   std::size_t triangleCount() const { return indices.size() / 3; }
 };

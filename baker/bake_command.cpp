@@ -1,0 +1,241 @@
+// lumel bake: from a scene file to the files of a bake.
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+
+#include "baker/bake.h"
+#include "baker/bake_files.h"
+#include "baker/command.h"
+#include "baker/finish.h"
+#include "baker/stage_clock.h"
+#include "lightmap/atlas.h"
+#include "lightmap/texels.h"
+#include "scene/environment.h"
+#include "scene/load_scene.h"
+#include "scene/parallel.h"
+
+namespace lumel {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kDilateByPadding = -1;
+
+struct BakeArguments {
+  fs::path scene;
+  fs::path output;
+  AtlasOptions atlas;
+  BakeOptions bake;
+  int dilate = kDilateByPadding;
+  bool half = false;
+  int threads = 0;
+  Vec3 skyColor{0, 0, 0};
+  fs::path sky;
+  float skyRotation = 0.0f;
+  float skyStrength = 1.0f;
+  bool allowOutsidePaths = false;
+};
+
+void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas) {
+  options.group("Atlas");
+  options.choice("uv", atlas.uvSource, {"auto", "scene", "generate"},
+                 "Lightmap UVs: TEXCOORD_1 where it is valid, else generated (auto); TEXCOORD_1 or an error (scene); "
+                 "always generated (generate)");
+  options.number("texels-per-meter", atlas.texelsPerMeter, {0.0f, 1e6f},
+                 "Texel density; 0: the density that fills one page");
+  options.integer("page-size", atlas.pageSize, {4, 16384}, "Texels on a side of a page, a multiple of 4");
+  options.integer("padding", atlas.padding, {0, 256}, "Texels kept free between charts, at least");
+  options.number("max-stretch", atlas.maxStretch, {1.0f, 1000.0f},
+                 "A chart whose texels are stretched more than this is split");
+  options.integer("block-align", atlas.blockAlign, {0, 64},
+                  "Align charts to blocks of so many texels, 4 for block compression; 0: off");
+}
+
+void declareLightOptions(OptionTable& options, BakeArguments& a) {
+  options.group("Light");
+  options.integer("samples", a.bake.samples, {1, 1 << 24}, "Gather rays per texel");
+  options.integer("bounces", a.bake.bounces, {0, 1024}, "Indirect bounces; 0: direct light only");
+  options.color("sky-color", a.skyColor, {0.0f}, "Radiance of an even sky in nits, red green blue [none]");
+  options.path("sky", a.sky, "Sky image: equirectangular .hdr or .exr [none]");
+  options
+      .number("sky-rotation", a.skyRotation, {},
+              "Degrees by which the sky image is turned, counter-clockwise from above")
+      .placeholder = "DEGREES";
+  options.number("sky-strength", a.skyStrength, {0.0f}, "Factor on the sky image or colour");
+  options.choice("projection", a.bake.projection, {"raw", "flat", "fit"},
+                 "How light is spread over the three maps: as in the literature (raw), scaled so that a flat normal is "
+                 "exact (flat), least squares (fit)");
+  options.integer("seed", a.bake.seed, "Seed of the sampling; the same seed gives the same bytes");
+}
+
+void declareOptions(OptionTable& options, BakeArguments& a) {
+  options.positionalPath("scene", a.scene, "Scene: .gltf, .glb or .obj").placeholder = "SCENE";
+  options.group("Files");
+  Option& output =
+      options.path("output", a.output, "Folder for the result; an older result is replaced when the new one is whole");
+  output.shortName = "o";
+  output.placeholder = "DIR";
+  output.required = true;
+  options.flag("half", a.half, "Write half floats: half the size, values up to 65504");
+  options.integer("dilate", a.dilate, {0, 1024}, "Rings of texels grown around charts; 0: none").defaultText =
+      "half of --padding";
+  options.flag("allow-outside-paths", a.allowOutsidePaths, "Let the scene name files outside its own folder");
+  declareAtlasOptions(options, a.atlas);
+  declareLightOptions(options, a);
+  options.group("General");
+  options.integer("threads", a.threads, {0, 1024}, "Threads to use, without influence on the result; 0: one per core");
+}
+
+/// What the options cannot check one by one.
+Expected<void> check(const BakeArguments& a) {
+  if (a.atlas.pageSize % 4 != 0)
+    return usageError("--page-size: " + std::to_string(a.atlas.pageSize) + " is not a multiple of 4");
+  if (!a.sky.empty() && a.skyColor != Vec3(0.0f))
+    return usageError("--sky and --sky-color: give one of them; --sky-strength scales either");
+  return {};
+}
+
+Expected<Scene> loadLitScene(const BakeArguments& a) {
+  auto scene = loadScene(a.scene, {.allowOutsidePaths = a.allowOutsidePaths});
+  if (!scene) return scene;
+  if (!a.sky.empty()) {
+    auto sky = loadEnvironment(a.sky);
+    if (!sky) return sky.error();
+    scene->environment = std::move(*sky);
+  } else {
+    scene->environment.color = a.skyColor;
+  }
+  scene->environment.rotationDegrees = a.skyRotation;
+  scene->environment.strength = a.skyStrength;
+  return scene;
+}
+
+bool hasLight(const Scene& scene) {
+  const auto emits = [](const Material& m) { return m.emission != Vec3(0.0f); };
+  return !scene.environment.isBlack() || !scene.lights.empty() ||
+         std::any_of(scene.materials.begin(), scene.materials.end(), emits);
+}
+
+void printWarnings(const std::vector<std::string>& warnings) {
+  constexpr std::size_t kShown = 12;
+  for (std::size_t i = 0; i < std::min(warnings.size(), kShown); ++i)
+    std::fprintf(stderr, "lumel: warning: %s\n", warnings[i].c_str());
+  if (warnings.size() > kShown)
+    std::fprintf(stderr, "lumel: %zu more warnings; all are in bake.json\n", warnings.size() - kShown);
+}
+
+void printSettings(const nlohmann::ordered_json& settings) {
+  std::string line = "settings";
+  for (const auto& [key, value] : settings.items()) {
+    if (value.is_null()) continue;
+    line += " " + key + "=" + (value.is_string() ? value.get<std::string>() : value.dump());
+  }
+  std::fprintf(stderr, "%s\n", line.c_str());
+}
+
+void printSummary(const fs::path& output, const AtlasResult& atlas, const BakeResult& result,
+                  const BakeRecord& record) {
+  double texels = 0.0;
+  for (const Page& page : atlas.atlas.pages)
+    texels += static_cast<double>(page.width) * static_cast<double>(page.height);
+  double seconds = 0.0;
+  for (const StageTime& stage : record.stages) seconds += stage.seconds;
+  const BakeStats& stats = result.stats;
+  const double relative = stats.meanFlat > 0.0 ? 100.0 * stats.meanStandardError / stats.meanFlat : 0.0;
+  const double rays = static_cast<double>(stats.rays + stats.shadowRays);
+  std::fprintf(stderr, "%s: %zu page%s, %.1f%% covered, %zu charts, %llu texels", output.c_str(),
+               atlas.atlas.pages.size(), atlas.atlas.pages.size() == 1 ? "" : "s",
+               texels > 0 ? 100.0 * static_cast<double>(stats.texels) / texels : 0.0, atlas.atlas.charts.size(),
+               static_cast<unsigned long long>(stats.texels));
+  if (atlas.atlas.texelsPerMeter > 0.0f)
+    std::fprintf(stderr, " at %.4g per metre", static_cast<double>(atlas.atlas.texelsPerMeter));
+  std::fprintf(stderr, "\nmean light %.4g, standard error %.2g%%, projection residual %.2g%%\n", stats.meanFlat,
+               relative, 100.0 * stats.projectionResidual);
+  std::fprintf(stderr, "%.1f s, %.1f million rays (%.1f million per second of bake), %.0f MiB at the peak\n", seconds,
+               rays / 1e6, stats.seconds > 0 ? rays / 1e6 / stats.seconds : 0.0,
+               static_cast<double>(record.peakMemoryBytes) / (1024.0 * 1024.0));
+}
+
+BakeRecord recordOf(const BakeArguments& a, int dilate, nlohmann::ordered_json settings) {
+  settings["dilate"] = dilate;
+  // What cannot change the result is kept out of the settings, so that equal bakes have equal settings.
+  for (const char* key : {"output", "threads"}) settings.erase(key);
+  BakeRecord record;
+  record.sceneFile = a.scene;
+  record.atlasOptions = a.atlas;
+  record.bakeOptions = a.bake;
+  record.dilate = dilate;
+  record.half = a.half;
+  record.threads = availableThreads();
+  record.settings = std::move(settings);
+  return record;
+}
+
+Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
+  if (auto checked = check(a); !checked) return checked;
+  if (auto writable = checkWritable(a.output); !writable) return writable;
+  const ThreadLimit limit(a.threads);
+  const int dilate = a.dilate == kDilateByPadding ? (a.atlas.padding + 1) / 2 : a.dilate;
+  BakeRecord record = recordOf(a, dilate, context.settings);
+  if (!context.quiet) printSettings(record.settings);
+
+  StageClock clock(context.quiet);
+  Progress& progress = context.progress;
+  clock.start("load");
+  const auto scene = loadLitScene(a);
+  if (!scene) return scene.error();
+  if (!context.quiet) printWarnings(scene->report.warnings);
+  if (!context.quiet && !hasLight(*scene))
+    std::fputs("lumel: warning: the scene has no light and all will be black; give --sky-color or --sky\n", stderr);
+  if (progress.cancelled()) return interrupted();
+
+  clock.start("atlas");
+  const auto atlas = buildAtlas(*scene, a.atlas, progress);
+  if (!atlas) return atlas.error();
+  if (!context.quiet) printWarnings(atlas->report.warnings);
+  clock.start("texels");
+  const auto texels = findTexels(atlas->atlas);
+  clock.start("bake");
+  auto baked = bake(*scene, atlas->atlas, texels, a.bake, progress);
+  if (!baked) return baked.error();
+  clock.start("finish");
+  dilatePages(baked->pages, dilate);
+  clock.stop();
+  if (progress.cancelled()) return interrupted();
+
+  record.stages = clock.stages();
+  record.peakMemoryBytes = peakMemoryBytes();
+  clock.start("write");
+  if (auto written = writeBake(a.output, *scene, *atlas, *baked, record); !written) return written;
+  clock.stop();
+  if (context.quiet) return {};
+  record.stages = clock.stages();
+  record.peakMemoryBytes = peakMemoryBytes();
+  printSummary(a.output, *atlas, *baked, record);
+  return {};
+}
+
+}  // namespace
+
+Command bakeCommand() {
+  Command command;
+  const auto arguments = std::make_shared<BakeArguments>();
+  command.name = "bake";
+  command.summary = "Bake a scene into lightmaps: three RNM maps and a flat one per atlas page";
+  command.takesConfig = true;
+  command.examples =
+      "Examples:\n"
+      "  lumel bake level.gltf -o out/level\n"
+      "      lights and emissive surfaces of the file, one page of 1024 x 1024\n"
+      "  lumel bake level.glb -o out/level --sky noon.hdr --sky-rotation 90 --texels-per-meter 16\n"
+      "      light from a sky image, as many pages as 16 texels per metre need\n"
+      "  lumel bake level.obj -o out/level --sky-color 0.4 0.6 1 --samples 64 --bounces 2\n"
+      "      a quick preview under an even blue sky\n"
+      "  lumel bake --config level.toml\n"
+      "      everything from a file: scene = \"level.gltf\", output = \"out/level\", samples = 1024";
+  declareOptions(command.options, *arguments);
+  command.run = [arguments](CommandContext& context) { return runBake(*arguments, context); };
+  return command;
+}
+
+}  // namespace lumel

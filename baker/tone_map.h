@@ -1,0 +1,21 @@
+// From linear radiance to what a screen shows.
+#pragma once
+
+#include "scene/image.h"
+
+namespace lumel {
+
+enum class ToneMap {
+  Aces,    // filmic curve: the rational fit of Narkowicz 2015 to the ACES reference transform
+  Linear,  // clipped at 1
+};
+
+/// Exposure in stops (a factor of 2^EV) that brings the geometric mean of what is in the picture to middle grey
+/// without burning out its bright parts. `surface` weighs the pixels: a bright sky does not darken the scene.
+/// 0 where nothing is lit.
+float autoExposure(const Image& radiance, const Image& surface);
+
+/// sRGB-encoded values in 0..1, ready for an 8-bit file.
+Image toneMap(const Image& radiance, float exposure, ToneMap curve);
+
+}  // namespace lumel

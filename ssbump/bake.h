@@ -1,0 +1,52 @@
+// A height map to its ssbump maps, in tiles: memory stays near that of the heights themselves.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "scene/progress.h"
+#include "ssbump/height_field.h"
+#include "ssbump/horizon.h"
+#include "ssbump/map_set.h"
+#include "ssbump/ray_occlusion.h"
+
+namespace lumel::ssbump {
+
+enum class BackEnd { Horizon, Rays };
+
+struct BakeSettings {
+  HeightOptions height;
+  int bilateralRadius = 0;            // texels; 0: no filter
+  float bilateralThresholdTexels = 0; // 0: two steps of the file's bit depth (2/255 of the scale for 8 bits)
+  std::filesystem::path normalMap;    // empty: normals derived from the heights
+  Green normalMapGreen = Green::Up;
+  BackEnd backEnd = BackEnd::Horizon;
+  HorizonSettings horizon;
+  RaySettings rays;
+  MapSettings maps;
+  int tileWidth = 2048, tileHeight = 1024;  // even; results do not depend on them
+};
+
+struct BakeReport {
+  int width = 0, height = 0;
+  float lowestTexels = 0, highestTexels = 0;
+  int reachTexels = 0;
+  double prepareSeconds = 0, occlusionSeconds = 0;
+  std::vector<std::string> warnings;
+};
+
+/// Everything from files to files. Errors: Input, Usage, Failed, Interrupted; none leaves a file behind.
+Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const BakeSettings& settings, Progress& progress);
+
+struct BakedInMemory {
+  HeightField field;
+  Image normals;    // (t, b, n)
+  Image occlusion;  // one channel per lobe
+};
+
+/// The same without files, for maps that fit in memory whole.
+Expected<BakedInMemory> bakeInMemory(const std::filesystem::path& input, const BakeSettings& settings,
+                                     std::span<const Lobe> lobes, Progress& progress);
+
+}  // namespace lumel::ssbump

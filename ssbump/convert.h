@@ -1,0 +1,35 @@
+// ssbump maps from one convention, handedness or kind to another, from and to normal maps, blended and cross-faded.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "ssbump/map_writer.h"
+#include "ssbump/weights.h"
+
+namespace lumel::ssbump {
+
+/// What a file holds: an ssbump map in an encoding, or (encoding absent) a normal map with its green channel's sense.
+struct MapForm {
+  std::optional<Encoding> encoding;
+  Green green = Green::Up;
+};
+
+struct ConvertSettings {
+  std::optional<MapForm> from;  // absent: as the file's metadata says
+  MapForm to;
+  std::filesystem::path detail;     // an ssbump map in the form of the input, blended in evenly
+  float detailRepeats = 1;
+  std::filesystem::path crossFade;  // a second map of the input's form and size
+  float crossFadeAmount = 0.5f;     // 0: the input, 1: the second map
+  std::filesystem::path albedo;     // its luminance multiplies the result
+  MapOptions options;
+};
+
+/// Alpha passes through. Errors: Input (too few channels, not finite, unknown form), Usage, Failed.
+Expected<void> convertMap(const std::filesystem::path& input, const std::filesystem::path& output, const ConvertSettings& settings);
+
+/// The form that a file's metadata names, if it names one.
+std::optional<MapForm> formFromMetadata(const LoadedImage& image);
+
+}  // namespace lumel::ssbump

@@ -1,0 +1,194 @@
+#include "ssbump/horizon.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "scene/check.h"
+#include "scene/parallel.h"
+
+namespace lumel::ssbump {
+namespace {
+
+// Measured against 16k rays on fractal, brick, step and rough fields of amplitudes 8 to 64: with 48 azimuths the error
+// is 15 to 25 times less than that of 300 random rays. Sharp steps need the 12 (with 4 their error doubles), smooth tall
+// fields the 16 steps per octave (with 8 it doubles).
+constexpr double kExactReach = 12;   // up to here every edge that the slice crosses is looked at
+constexpr int kStepsPerOctave = 16;  // beyond kUnitReach: box maxima, the box as wide as the step
+constexpr int kUnitReach = 2 * kStepsPerOctave;  // up to here every crossing along the dominant axis
+
+struct LerpStep {
+  int ax, ay, bx, by;  // the two vertices of the crossed edge
+  float fraction, inverseDistance;
+};
+
+struct BoxStep {
+  int level, x, y;
+  float inverseDistance;
+};
+
+struct Slice {
+  std::vector<LerpStep> lerps;
+  std::vector<BoxStep> boxes;
+  std::vector<LobeSlice> lobes;
+};
+
+/// The point `distance` along the slice, on the edge from floor to floor + (ex, ey).
+LerpStep crossing(double x, double y, int ex, int ey, double distance) {
+  // On an x-line x is whole and y is not, and so on: round what is whole, floor what is not.
+  int ax, ay;
+  double fraction;
+  if (ex == 0) {
+    ax = static_cast<int>(std::lround(x));
+    ay = static_cast<int>(std::floor(y));
+    fraction = y - ay;
+  } else {
+    ax = static_cast<int>(std::floor(x));
+    fraction = x - ax;
+    ay = ey == 0 ? static_cast<int>(std::lround(y)) : ax + static_cast<int>(std::lround(y - x));
+  }
+  int bx = ax + ex, by = ay + ey;
+  if (fraction > 1 - 1e-6) {
+    ax = bx;
+    ay = by;
+    fraction = 0;
+  }
+  if (fraction < 1e-6) {
+    bx = ax;
+    by = ay;
+    fraction = 0;
+  }
+  return {ax, ay, bx, by, static_cast<float>(fraction), static_cast<float>(1 / distance)};
+}
+
+Slice makeSlice(double phi, int reach, int levels, std::span<const Lobe> lobes) {
+  Slice slice;
+  const double ux = std::cos(phi), uy = -std::sin(phi);  // image rows run down, b points up
+  const auto addLines = [&](double speed, int ex, int ey, double from, double to) {
+    if (std::abs(speed) < 1e-9) return;
+    for (int k = 1;; ++k) {
+      const double d = k / std::abs(speed);
+      if (d > to + 1e-9) break;
+      if (d > from + 1e-9) slice.lerps.push_back(crossing(d * ux, d * uy, ex, ey, d));
+    }
+  };
+  const double exact = std::min<double>(kExactReach, reach);
+  addLines(ux, 0, 1, 0, exact);
+  addLines(uy, 1, 0, 0, exact);
+  addLines(ux - uy, 1, 1, 0, exact);
+  const bool alongX = std::abs(ux) >= std::abs(uy);
+  const double major = alongX ? ux : uy, minor = alongX ? uy : ux;
+  addLines(major, alongX ? 0 : 1, alongX ? 1 : 0, exact, std::min<double>(kUnitReach / std::abs(major), reach));
+
+  for (int level = 1; level <= levels; ++level) {
+    const int box = 1 << level;
+    for (int j = 0; j < kStepsPerOctave; ++j) {
+      // The box covers the whole steps (n + j) box + 1 ... (n + j + 1) box along the dominant axis, about its centre.
+      // It is as wide across the slice as along it, so its maximum is too high on average; taking it at the box's far
+      // end cancels most of that (bias on fractals of amplitude 64: -0.0009 instead of -0.0019).
+      const double centre = (kStepsPerOctave + j) * box + (box + 1) / 2.0;
+      const double distance = (centre + box / 2.0) / std::abs(major);
+      if (centre / std::abs(major) > reach) break;
+      // A level's entry p is the maximum over [p - box/2, p + box/2): its centre lies half a texel lower.
+      const int p = static_cast<int>(std::lround(std::copysign(centre, major) + 0.5));
+      const int m = static_cast<int>(std::lround(centre * minor / std::abs(major) + 0.5));
+      slice.boxes.push_back({level, alongX ? p : m, alongX ? m : p, static_cast<float>(1 / distance)});
+    }
+  }
+  for (const Lobe& lobe : lobes) slice.lobes.emplace_back(lobe, phi);
+  return slice;
+}
+
+int levelCount(int reach) {
+  int levels = 0;
+  while ((kStepsPerOctave << (levels + 1)) < reach) ++levels;
+  return levels;
+}
+
+/// The arrays that one row hands to the kernel, refilled for each azimuth.
+struct RowPointers {
+  std::vector<const float*> a, b, box;
+  std::vector<float> fraction, lerpInverse, boxInverse;
+
+  void set(const Slice& slice, const std::vector<MaxLevel>& levels, int x, int y) {
+    a.clear(), b.clear(), box.clear(), fraction.clear(), lerpInverse.clear(), boxInverse.clear();
+    for (const LerpStep& s : slice.lerps) {
+      a.push_back(levels[0].at(x + s.ax, y + s.ay));
+      b.push_back(levels[0].at(x + s.bx, y + s.by));
+      fraction.push_back(s.fraction);
+      lerpInverse.push_back(s.inverseDistance);
+    }
+    for (const BoxStep& s : slice.boxes) {
+      box.push_back(levels[static_cast<std::size_t>(s.level)].at(x + s.x, y + s.y));
+      boxInverse.push_back(s.inverseDistance);
+    }
+  }
+};
+
+}  // namespace
+
+int automaticReach(const HeightField& field) {
+  const double span = static_cast<double>(field.highest) - static_cast<double>(field.lowest);
+  const double side = std::max(field.width, field.height);
+  const double most = field.wrap ? 4 * side : std::hypot(field.width, field.height);
+  return static_cast<int>(std::ceil(std::clamp(span / 0.01, 1.0, std::max(1.0, most))));
+}
+
+Horizon::Horizon(const HeightField& field, const HorizonSettings& settings) : settings_(settings), rows_(field) {
+  LUMEL_CHECK(settings.azimuths >= 1);
+  if (settings_.reach <= 0) settings_.reach = automaticReach(field);
+}
+
+Image Horizon::occlusion(const TexelRect& rect, std::span<const Lobe> lobes) const {
+  const int levelsUsed = levelCount(settings_.reach);
+  std::vector<Slice> slices;
+  std::vector<float> open(lobes.size(), 0.0f);  // summed as the kernel sums: flat gives exactly 1
+  for (int j = 0; j < settings_.azimuths; ++j) {
+    slices.push_back(makeSlice(sliceAzimuth(j, settings_.azimuths), settings_.reach, levelsUsed, lobes));
+    for (std::size_t c = 0; c < lobes.size(); ++c) open[c] += slices.back().lobes[c].open;
+  }
+  std::vector<MaxLevel> levels;
+  for (int level = 0; level <= levelsUsed; ++level) {
+    const int box = 1 << level;
+    const int range = level == 0 ? kUnitReach + 1 : 2 * kStepsPerOctave * box + box;
+    levels.emplace_back(rows_, rect, box, range, kHorizonBlock);
+  }
+  const int padded = (rect.width + kHorizonBlock - 1) / kHorizonBlock * kHorizonBlock;
+  const auto width = static_cast<std::size_t>(rect.width);
+  Image out(rect.width, rect.height, static_cast<int>(lobes.size()));
+  parallelFor(static_cast<std::size_t>(rect.height), 8, [&](std::size_t first, std::size_t last) {
+    RowPointers pointers;
+    std::vector<float> sums(lobes.size() * static_cast<std::size_t>(padded));
+    std::vector<float*> sumRows;
+    for (std::size_t c = 0; c < lobes.size(); ++c) sumRows.push_back(&sums[c * static_cast<std::size_t>(padded)]);
+    for (std::size_t y = first; y < last; ++y) {
+      std::fill(sums.begin(), sums.end(), 0.0f);
+      const int mapY = rect.y + static_cast<int>(y);
+      for (const Slice& slice : slices) {
+        pointers.set(slice, levels, rect.x, mapY);
+        HorizonRow row;
+        row.own = levels[0].at(rect.x, mapY);
+        row.lerpA = pointers.a.data();
+        row.lerpB = pointers.b.data();
+        row.fraction = pointers.fraction.data();
+        row.lerpInverse = pointers.lerpInverse.data();
+        row.lerpCount = pointers.a.size();
+        row.box = pointers.box.data();
+        row.boxInverse = pointers.boxInverse.data();
+        row.boxCount = pointers.box.size();
+        row.slices = slice.lobes.data();
+        row.channels = lobes.size();
+        row.sums = sumRows.data();
+        row.width = padded;
+        horizonRow(row, settings_.simd);
+      }
+      for (std::size_t c = 0; c < lobes.size(); ++c) {
+        float* o = out.pixels.data() + y * width * lobes.size() + c;
+        for (std::size_t x = 0; x < width; ++x)
+          o[x * lobes.size()] = open[c] > 0 ? std::clamp(sumRows[c][x] / open[c], 0.0f, 1.0f) : 1.0f;
+      }
+    }
+  });
+  return out;
+}
+
+}  // namespace lumel::ssbump

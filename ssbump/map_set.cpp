@@ -1,0 +1,203 @@
+#include "ssbump/map_set.h"
+
+#include <algorithm>
+
+#include "lightmap/rnm_basis.h"
+#include "scene/check.h"
+#include "scene/parallel.h"
+
+namespace lumel::ssbump {
+namespace {
+
+Expected<Image> readAlbedo(const std::filesystem::path& file) {
+  auto loaded = readImage(file);
+  if (!loaded) return loaded.error();
+  if (!loaded->isFloat)
+    for (float& v : loaded->image.pixels) v = srgbToLinear(v);
+  return std::move(loaded->image);
+}
+
+Expected<Image> readMask(const std::filesystem::path& file, int width, int height) {
+  auto loaded = readImage(file);
+  if (!loaded) return loaded.error();
+  if (loaded->image.width != width || loaded->image.height != height)
+    return inputError(file.string() + ": the mask is " + std::to_string(loaded->image.width) + "x" +
+                      std::to_string(loaded->image.height) + ", the map " + std::to_string(width) + "x" +
+                      std::to_string(height) + "; make them the same size");
+  Image plane(width, height, 1);
+  for (std::size_t i = 0; i < plane.pixels.size(); ++i)
+    plane.pixels[i] = loaded->image.pixels[i * static_cast<std::size_t>(loaded->image.channels)];
+  return plane;
+}
+
+void forEachTexel(Image& image, const std::function<void(int, int)>& body) {
+  parallelFor(static_cast<std::size_t>(image.height), 16, [&](std::size_t first, std::size_t last) {
+    for (std::size_t y = first; y < last; ++y)
+      for (int x = 0; x < image.width; ++x) body(x, static_cast<int>(y));
+  });
+}
+
+std::vector<std::string> channelNames(std::size_t count, bool alpha) {
+  std::vector<std::string> names;
+  if (count != 3)
+    for (std::size_t i = 0; i < count; ++i) names.push_back("B" + std::to_string(i));
+  else
+    names = {"R", "G", "B"};
+  if (alpha) names.push_back("A");
+  return names;
+}
+
+}  // namespace
+
+Expected<MapSet> MapSet::open(const MapSettings& settings, int width, int height, Image alpha,
+                              std::map<std::string, std::string> metadata) {
+  MapSet set;
+  set.settings_ = settings;
+  set.width_ = width;
+  set.height_ = height;
+  set.alpha_ = std::move(alpha);
+  const bool rnm = settings.basis.empty();
+  set.basisSize_ = rnm ? 3 : settings.basis.size();
+  if (!rnm && settings.encoding.hand == Hand::Left) return usageError("--hand left is a swap of the RNM basis's channels; it does not go with --basis");
+  if (!rnm && set.basisSize_ != 3 && (!settings.detail.empty() || !settings.files.recovered.empty()))
+    return usageError("--detail and --save-recovered need the three RNM vectors; leave out --basis");
+  if (!settings.mask.empty()) {
+    auto mask = readMask(settings.mask, width, height);
+    if (!mask) return mask.error();
+    set.alpha_ = std::move(*mask);
+  }
+  if (!settings.albedo.empty()) {
+    auto albedo = readAlbedo(settings.albedo);
+    if (!albedo) return albedo.error();
+    set.albedo_ = std::move(*albedo);
+  }
+  if (!settings.detail.empty()) {
+    auto detail = readImage(settings.detail);
+    if (!detail) return detail.error();
+    set.detail_ = std::move(detail->image);
+  }
+  const std::span<const Vec3> basis = rnm ? std::span<const Vec3>(kRnmBasis) : std::span<const Vec3>(settings.basis);
+  for (const Vec3& axis : basis) set.lobes_.push_back({axis, settings.lobe, settings.coneOpeningDegrees});
+  if (!settings.files.ambient.empty()) set.lobes_.push_back(ambientLobe());
+
+  for (const auto& [key, value] : encodingMetadata(settings.encoding)) metadata[key] = value;
+  if (!rnm) {
+    std::string text;
+    for (const Vec3& v : basis) text += std::to_string(v.x) + " " + std::to_string(v.y) + " " + std::to_string(v.z) + "; ";
+    metadata["lumel:ssbump:basis"] = text;
+  }
+  metadata["lumel:green"] = settings.green == Green::Up ? "up" : "down";
+  const auto open = [&](const std::filesystem::path& file, std::size_t channels, bool withAlpha, MapKind kind,
+                        const char* content, std::optional<MapWriter>& writer) -> Expected<void> {
+    if (file.empty()) return {};
+    auto names = channels == 1 ? std::vector<std::string>{"Y"} : channelNames(channels, withAlpha);
+    auto own = metadata;
+    own["lumel:content"] = content;
+    auto opened = MapWriter::open(file, width, height, static_cast<int>(channels) + (withAlpha ? 1 : 0), kind,
+                                  settings.options, std::move(names), std::move(own));
+    if (!opened) return opened.error();
+    writer.emplace(std::move(*opened));
+    return {};
+  };
+  const bool hasAlpha = !set.alpha_.empty();
+  const MapFiles& f = settings.files;
+  for (const auto& opened :
+       {open(f.ssbump, set.basisSize_, hasAlpha, MapKind::Weights, "ssbump", set.ssbump_),
+        open(f.weights, set.basisSize_, false, MapKind::Weights, "weights without occlusion", set.weights_),
+        open(f.occlusion, set.basisSize_, false, MapKind::Weights, "visibility around each basis vector", set.occlusion_),
+        open(f.ambient, 1, false, MapKind::Weights, "cosine-weighted visibility", set.ambient_),
+        open(f.normal, 3, false, MapKind::Normals, "normal map", set.normal_),
+        open(f.recovered, 3, false, MapKind::Normals, "normal map recovered from the ssbump map", set.recovered_)})
+    if (!opened) return opened.error();
+  return set;
+}
+
+Image MapSet::compose(const Image& normals, const Image& occlusion, bool withOcclusion) const {
+  const std::size_t n = basisSize_;
+  Image out(normals.width, normals.height, static_cast<int>(n));
+  forEachTexel(out, [&](int x, int y) {
+    const std::span<float> s(out.at(x, y), n);
+    normalWeights(normals.rgb(x, y), settings_.encoding.convention, settings_.basis, s);
+    if (withOcclusion)
+      for (std::size_t i = 0; i < n; ++i) s[i] *= occlusion.at(x, y)[i];
+    if (settings_.encoding.hand == Hand::Left && n == 3) std::swap(s[1], s[2]);
+  });
+  return out;
+}
+
+void MapSet::modulate(Image& rows) const {
+  const float detailScale = 1 / (3 * flatValue(settings_.encoding.convention));
+  if (albedo_.empty() && detail_.empty()) return;
+  forEachTexel(rows, [&](int x, int y) {
+    const float u = (static_cast<float>(x) + 0.5f) / static_cast<float>(width_);
+    const float v = (static_cast<float>(y + row_) + 0.5f) / static_cast<float>(height_);
+    float factor = 1;
+    if (!albedo_.empty()) factor *= luminance(sampleRepeated(albedo_, u, v));
+    if (!detail_.empty()) {
+      const Vec3 d = sampleRepeated(detail_, u * settings_.detailRepeats, v * settings_.detailRepeats);
+      factor *= (d.x + d.y + d.z) * detailScale;
+    }
+    for (std::size_t i = 0; i < basisSize_; ++i) rows.at(x, y)[i] *= factor;
+  });
+}
+
+void MapSet::addAlpha(Image& rows) const {
+  if (alpha_.empty()) return;
+  Image with(rows.width, rows.height, rows.channels + 1);
+  forEachTexel(with, [&](int x, int y) {
+    std::copy_n(rows.at(x, y), rows.channels, with.at(x, y));
+    with.at(x, y)[rows.channels] = *alpha_.at(x, row_ + y);
+  });
+  rows = std::move(with);
+}
+
+Expected<void> MapSet::write(const Image& normals, const Image& occlusion) {
+  LUMEL_CHECK(normals.width == width_ && occlusion.width == width_ && normals.height == occlusion.height);
+  LUMEL_CHECK(static_cast<std::size_t>(occlusion.channels) == lobes_.size());
+  Image ssbump = compose(normals, occlusion, true);
+  modulate(ssbump);
+  const auto put = [](std::optional<MapWriter>& writer, const auto& make) { return writer ? writer->write(make()) : Expected<void>(); };
+  const auto perTexel = [&](int channels, const auto& value) {
+    Image out(normals.width, normals.height, channels);
+    forEachTexel(out, [&](int x, int y) { value(x, y, out.at(x, y)); });
+    return out;
+  };
+  const auto setNormal = [&](const Vec3& n, float* out) {
+    const Vec3 stored = encodeNormal(n, settings_.green);
+    std::copy_n(&stored.x, 3, out);
+  };
+  if (auto r = put(weights_, [&] { return compose(normals, occlusion, false); }); !r) return r;
+  if (auto r = put(occlusion_, [&] {
+        return perTexel(static_cast<int>(basisSize_), [&](int x, int y, float* out) { std::copy_n(occlusion.at(x, y), basisSize_, out); });
+      }); !r) return r;
+  if (auto r = put(ambient_, [&] { return perTexel(1, [&](int x, int y, float* out) { *out = occlusion.at(x, y)[basisSize_]; }); }); !r) return r;
+  if (auto r = put(normal_, [&] { return perTexel(3, [&](int x, int y, float* out) { setNormal(normals.rgb(x, y), out); }); }); !r) return r;
+  if (auto r = put(recovered_, [&] {
+        return perTexel(3, [&](int x, int y, float* out) {
+          const Vec3 s = convert(ssbump.rgb(x, y), settings_.encoding, {settings_.encoding.convention, Hand::Right});
+          setNormal(recoveredNormal(s, settings_.encoding.convention), out);
+        });
+      }); !r) return r;
+  addAlpha(ssbump);
+  row_ += normals.height;
+  return ssbump_ ? ssbump_->write(ssbump) : Expected<void>();
+}
+
+Expected<void> MapSet::commit() {
+  LUMEL_CHECK(row_ == height_);
+  for (auto* writer : {&weights_, &occlusion_, &ambient_, &normal_, &recovered_, &ssbump_})
+    if (*writer)
+      if (auto done = (*writer)->commit(); !done) return done;
+  return {};
+}
+
+std::vector<std::string> MapSet::warnings() const {
+  std::vector<std::string> all;
+  for (const auto* writer : {&ssbump_, &weights_})
+    if (*writer && (*writer)->clipped() > 0)
+      all.push_back((*writer)->file().string() + ": " + std::to_string((*writer)->clipped()) +
+                    " values beyond 0..1 were cut; float formats or --convention squared hold them");
+  return all;
+}
+
+}  // namespace lumel::ssbump

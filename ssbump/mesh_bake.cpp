@@ -1,0 +1,41 @@
+#include <chrono>
+
+#include "scene/load_scene.h"
+#include "ssbump/mesh_source.h"
+
+namespace lumel::ssbump {
+
+Expected<BakeReport> bakeMesh(const std::filesystem::path& high, const std::filesystem::path& low, const MeshSettings& settings,
+                              Progress& progress) {
+  const auto started = std::chrono::steady_clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count(); };
+  auto highScene = loadScene(high);
+  if (!highScene) return highScene.error();
+  std::optional<Scene> lowScene;
+  if (!low.empty()) {
+    auto loaded = loadScene(low);
+    if (!loaded) return loaded.error();
+    lowScene = std::move(*loaded);
+  }
+  auto maps = MapSet::open(settings.maps, settings.width, settings.height, {},
+                           {{"lumel:occlusion", "rays, " + std::to_string(settings.rays.count) + " per texel, against " + high.filename().string()},
+                            {"lumel:wrap", low.empty() && settings.wrap ? "yes" : "no"}});
+  if (!maps) return maps.error();
+  BakeReport report;
+  report.width = settings.width;
+  report.height = settings.height;
+  report.prepareSeconds = seconds();
+  auto texels = gatherMesh(*highScene, lowScene ? &*lowScene : nullptr, settings, maps->lobes(), progress);
+  if (!texels) {
+    const Error& e = texels.error();
+    return Error{e.kind, (e.message.starts_with("low-poly") ? low : high).string() + ": " + e.message};
+  }
+  report.occlusionSeconds = seconds() - report.prepareSeconds;
+  if (auto done = maps->write(texels->normals, texels->occlusion); !done) return done.error();
+  if (auto done = maps->commit(); !done) return done.error();
+  report.warnings = maps->warnings();
+  for (const std::string& w : highScene->report.warnings) report.warnings.push_back(w);
+  return report;
+}
+
+}  // namespace lumel::ssbump

@@ -1,0 +1,259 @@
+#include "ssbump/study.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <numeric>
+#include <system_error>
+
+#include "scene/image_io.h"
+#include "ssbump/block_compression.h"
+#include "ssbump/contact_sheet.h"
+#include "ssbump/mip.h"
+#include "ssbump/weights.h"
+
+namespace lumel::ssbump {
+namespace {
+
+struct Format {
+  const char* name;
+  double bits;
+  Convention stored;
+  std::function<Image(const Image&)> roundTrip;  // of the stored values
+};
+
+Image mapTexels(const Image& in, const std::function<Vec3(const Vec3&)>& f) {
+  Image out(in.width, in.height, 3);
+  for (int y = 0; y < in.height; ++y)
+    for (int x = 0; x < in.width; ++x) out.setRgb(x, y, f(in.rgb(x, y)));
+  return out;
+}
+
+Image quantise(const Image& in, const Vec3& steps) {
+  return mapTexels(in, [&](const Vec3& s) { return glm::round(glm::clamp(s, 0.0f, 1.0f) * steps) / steps; });
+}
+
+Image throughBlocks(const Image& in, BlockFormat format) {
+  return decompressBlocks(compressBlocks(in, format), in.width, in.height, format);
+}
+
+Image dropAlpha(const Image& in) {
+  return mapTexels(in, [](const Vec3& s) { return s; });
+}
+
+/// One weight in the alpha block, whose eight levels are its own; the colour block's line is left with two.
+Image throughSplit(const Image& in) {
+  Image packed(in.width, in.height, 4);
+  for (int y = 0; y < in.height; ++y)
+    for (int x = 0; x < in.width; ++x) {
+      const Vec3 s = in.rgb(x, y);
+      const Vec4 texel(s.x, s.z, 0, s.y);
+      std::copy_n(&texel.x, 4, packed.at(x, y));
+    }
+  const Image back = throughBlocks(packed, BlockFormat::Bc3);
+  Image out(in.width, in.height, 3);
+  for (int y = 0; y < in.height; ++y)
+    for (int x = 0; x < in.width; ++x) out.setRgb(x, y, {back.at(x, y)[0], back.at(x, y)[3], back.at(x, y)[1]});
+  return out;
+}
+
+Image throughThreeBlocks(const Image& in) {
+  Image two(in.width, in.height, 3), one(in.width, in.height, 1);
+  for (int y = 0; y < in.height; ++y)
+    for (int x = 0; x < in.width; ++x) {
+      const Vec3 s = in.rgb(x, y);
+      two.setRgb(x, y, {s.x, s.y, 0});
+      *one.at(x, y) = s.z;
+    }
+  const Image a = throughBlocks(two, BlockFormat::Bc5), b = throughBlocks(one, BlockFormat::Bc4);
+  Image out(in.width, in.height, 3);
+  for (int y = 0; y < in.height; ++y)
+    for (int x = 0; x < in.width; ++x) out.setRgb(x, y, {a.at(x, y)[0], a.at(x, y)[1], b.at(x, y)[0]});
+  return out;
+}
+
+std::vector<Format> formats() {
+  const auto rgb8 = [](const Image& i) { return quantise(i, Vec3(255)); };
+  const auto rgb565 = [](const Image& i) { return quantise(i, Vec3(31, 63, 31)); };
+  const auto bc1 = [](const Image& i) { return dropAlpha(throughBlocks(i, BlockFormat::Bc1)); };
+  return {{"RGB8", 24, Convention::Squared, rgb8},
+          {"RGB8 linear", 24, Convention::Linear, rgb8},
+          {"RGB565", 16, Convention::Squared, rgb565},
+          {"RGB565 linear", 16, Convention::Linear, rgb565},
+          {"BC5 + BC4", 12, Convention::Squared, throughThreeBlocks},
+          {"BC5 + BC4 linear", 12, Convention::Linear, throughThreeBlocks},
+          {"BC3 split", 8, Convention::Squared, throughSplit},
+          {"BC3 split linear", 8, Convention::Linear, throughSplit},
+          {"BC1", 4, Convention::Squared, bc1},
+          {"BC1 linear", 4, Convention::Linear, bc1}};
+}
+
+Image storedAndBack(const Image& map, const Format& format) {
+  Image stored = map;
+  convert(stored, {}, {format.stored, Hand::Right});
+  Image back = format.roundTrip(stored);
+  convert(back, {format.stored, Hand::Right}, {});
+  return back;
+}
+
+/// Sixteen lights: four azimuths off the axes at four elevations.
+std::vector<Vec3> lights() {
+  std::vector<Vec3> all;
+  for (int e = 0; e < 4; ++e)
+    for (int a = 0; a < 4; ++a) {
+      const float elevation = (static_cast<float>(e) + 0.5f) * kPi / 8, azimuth = (static_cast<float>(a) + 0.3f + 0.25f * static_cast<float>(e)) * kPi / 2;
+      all.emplace_back(std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation), std::sin(elevation));
+    }
+  return all;
+}
+
+double degreesBetween(const Vec3& a, const Vec3& b) {
+  // By the chord: exact for small angles, where the arc cosine is not.
+  return 2 * std::asin(std::min(1.0, 0.5 * static_cast<double>(glm::length(a - b)))) * 180 / std::numbers::pi;
+}
+
+StudyRow compare(const Image& truth, const Image& other) {
+  StudyRow row;
+  const std::vector<Vec3> directions = lights();
+  std::vector<double> angles;
+  double weights = 0, light = 0;
+  for (int y = 0; y < truth.height; ++y)
+    for (int x = 0; x < truth.width; ++x) {
+      const Vec3 a = truth.rgb(x, y), b = other.rgb(x, y);
+      for (int c = 0; c < 3; ++c) {
+        const double d = static_cast<double>(b[c]) - static_cast<double>(a[c]);
+        weights += d * d;
+        row.weightMax = std::max(row.weightMax, std::abs(d));
+      }
+      for (const Vec3& l : directions) {
+        // A flat open texel that faces the light gives 1/3: scaled so that this is 1.
+        const double d = 3 * (static_cast<double>(litBy(b, l)) - static_cast<double>(litBy(a, l)));
+        light += d * d;
+        row.lightMax = std::max(row.lightMax, std::abs(d));
+      }
+      angles.push_back(degreesBetween(recoveredNormal(a), recoveredNormal(b)));
+    }
+  const double texels = static_cast<double>(angles.size());
+  row.weightRmse = std::sqrt(weights / (3 * texels));
+  row.lightRmse = std::sqrt(light / (static_cast<double>(directions.size()) * texels));
+  row.normalMeanDegrees = std::accumulate(angles.begin(), angles.end(), 0.0) / texels;
+  auto high = angles.begin() + static_cast<std::ptrdiff_t>(angles.size() * 99 / 100);
+  std::nth_element(angles.begin(), high, angles.end());
+  row.normal99Degrees = *high;
+  return row;
+}
+
+std::vector<Image> levelsTo(const Image& map, int lastMip) {
+  std::vector<Image> levels{map};
+  while (static_cast<int>(levels.size()) <= lastMip && (levels.back().width > 1 || levels.back().height > 1))
+    levels.push_back(halve(levels.back(), MipFilter::Box, true));
+  return levels;
+}
+
+std::string table(const std::vector<StudyRow>& rows, const std::vector<MipRow>& mips, const std::string& title) {
+  std::string text = "# Compression study: " + title + "\n\n| format | bits | mip | weight rmse | max | light rmse | max | normal mean deg | 99% |\n"
+                     "|---|---|---|---|---|---|---|---|---|\n";
+  std::array<char, 256> line{};
+  for (const StudyRow& r : rows) {
+    std::snprintf(line.data(), line.size(), "| %s | %g | %d | %.5f | %.4f | %.5f | %.4f | %.3f | %.3f |\n", r.format.c_str(), r.bitsPerTexel,
+                  r.mip, r.weightRmse, r.weightMax, r.lightRmse, r.lightMax, r.normalMeanDegrees, r.normal99Degrees);
+    text += line.data();
+  }
+  text += "\n| mip | light rmse against the mean of mip 0 | recovered normal against the mean normal, mean deg |\n|---|---|---|\n";
+  for (const MipRow& r : mips) {
+    std::snprintf(line.data(), line.size(), "| %d | %.6f | %.3f |\n", r.mip, r.lightRmse, r.normalMeanDegrees);
+    text += line.data();
+  }
+  return text;
+}
+
+Image studyPicture(const Image& map) {
+  const int w = std::min(map.width, 256), h = std::min(map.height, 256);
+  Image crop(w, h, 3);
+  for (int y = 0; y < h; ++y) std::copy_n(map.at(0, y), w * 3, crop.at(0, y));
+  const Vec3 right = glm::normalize(Vec3(1, 0, 0.5f));
+  std::vector<Image> panels;
+  for (const Format& format : formats()) {
+    const Image back = storedAndBack(crop, format);
+    Image error(w, h, 3);
+    for (std::size_t i = 0; i < error.pixels.size(); ++i) error.pixels[i] = 8 * std::abs(back.pixels[i] - crop.pixels[i]);
+    panels.push_back(mapTexels(back, [](const Vec3& s) { return s * 1.5f; }));
+    panels.push_back(std::move(error));
+    panels.push_back(mapTexels(back, [&](const Vec3& s) { return Vec3(litBy(s, right)); }));
+    panels.push_back(mapTexels(back, [](const Vec3& s) { return encodeNormal(recoveredNormal(s), Green::Up); }));
+  }
+  return panelGrid(panels, 4);
+}
+
+/// Small text files follow the same rule as images: complete or absent.
+Expected<void> writeText(const std::filesystem::path& file, const std::string& text) {
+  const auto temporary = file.parent_path() / ("." + file.filename().string() + "." + std::to_string(getpid()) + ".part");
+  std::ofstream out(temporary, std::ios::binary);
+  out << text;
+  out.close();
+  std::error_code ec;
+  if (out) std::filesystem::rename(temporary, file, ec);
+  if (out && !ec) return {};
+  std::filesystem::remove(temporary, ec);
+  return failure(file.string() + ": cannot be written");
+}
+
+}  // namespace
+
+std::vector<StudyRow> studyFormats(const Image& map, int lastMip) {
+  const std::vector<Image> levels = levelsTo(map, lastMip);
+  std::vector<StudyRow> rows;
+  for (const Format& format : formats())
+    for (std::size_t mip = 0; mip < levels.size(); ++mip) {
+      StudyRow row = compare(levels[mip], storedAndBack(levels[mip], format));
+      row.format = format.name;
+      row.bitsPerTexel = format.bits;
+      row.mip = static_cast<int>(mip);
+      rows.push_back(row);
+    }
+  return rows;
+}
+
+std::vector<MipRow> studyMips(const Image& map, int lastMip) {
+  const std::vector<Image> levels = levelsTo(map, lastMip);
+  Image normals = mapTexels(map, [](const Vec3& s) { return recoveredNormal(s); });
+  const std::vector<Vec3> directions = lights();
+  std::vector<Image> lit;
+  for (const Vec3& l : directions) lit.push_back(mapTexels(map, [&](const Vec3& s) { return Vec3(3 * litBy(s, l)); }));
+  std::vector<MipRow> rows;
+  for (std::size_t mip = 1; mip < levels.size(); ++mip) {
+    normals = halve(normals, MipFilter::Box, true);
+    for (Image& image : lit) image = halve(image, MipFilter::Box, true);
+    MipRow row{static_cast<int>(mip), 0, 0};
+    const Image& level = levels[mip];
+    for (int y = 0; y < level.height; ++y)
+      for (int x = 0; x < level.width; ++x) {
+        const Vec3 mean = normals.rgb(x, y);
+        row.normalMeanDegrees += degreesBetween(recoveredNormal(level.rgb(x, y)), glm::normalize(mean));
+        for (std::size_t k = 0; k < directions.size(); ++k) {
+          const double d = static_cast<double>(3 * litBy(level.rgb(x, y), directions[k]) - lit[k].at(x, y)[0]);
+          row.lightRmse += d * d;
+        }
+      }
+    const double texels = static_cast<double>(level.width) * level.height;
+    row.normalMeanDegrees /= texels;
+    row.lightRmse = std::sqrt(row.lightRmse / (texels * static_cast<double>(directions.size())));
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+Expected<void> writeStudy(const Image& map, const std::string& title, const std::filesystem::path& folder) {
+  std::error_code ec;
+  std::filesystem::create_directories(folder, ec);
+  if (ec) return failure(folder.string() + ": cannot be made: " + ec.message());
+  if (auto done = writeText(folder / "study.md", table(studyFormats(map, 3), studyMips(map, 6), title)); !done) return done;
+  return writeImage(folder / "study.png", studyPicture(map), {.format = PixelFormat::U8, .channelNames = {}, .metadata = {}});
+}
+
+}  // namespace lumel::ssbump
