@@ -44,6 +44,7 @@ class WaveTracer {
   void startSample();
   void lightTexels();
   void followPaths();
+  void findHits(int depth);
   bool shadeHit(int lane, int depth);
   void endDarkPaths(int depth);
   bool scatter(int depth);
@@ -67,6 +68,7 @@ class WaveTracer {
   SampleLanes samples_;
   StratumOrder order_;
   RayPacket rays_;
+  std::array<HitSurface, kLanes> hits_;
   WaveResult result_;
 };
 
@@ -163,6 +165,7 @@ void WaveTracer::lightTexels() {
 void WaveTracer::followPaths() {
   for (int depth = 0;; ++depth) {
     transport_.rays.intersect(rays_, depth == 0 ? options_.gatherMode : options_.bounceMode);
+    findHits(depth);
     for (int lane = 0; lane < kLanes; ++lane)
       lanes_.active[static_cast<std::size_t>(lane)] = rays_.valid[lane] != 0 && shadeHit(lane, depth);
     if (depth >= kRouletteAfter) endDarkPaths(depth);
@@ -182,6 +185,15 @@ void WaveTracer::followPaths() {
   }
 }
 
+/// Looks up the surfaces that the lanes' rays hit before any is shaded, so that the lanes wait for memory together.
+void WaveTracer::findHits(int depth) {
+  for (int lane = 0; lane < kLanes; ++lane)
+    if (rays_.hit(lane)) hits_[static_cast<std::size_t>(lane)] = transport_.rays.surfaceAt(rays_, lane);
+  if (depth == lastDepth_) return;
+  for (int lane = 0; lane < kLanes; ++lane)
+    if (rays_.hit(lane)) transport_.materials.prefetchAlbedo(hits_[static_cast<std::size_t>(lane)].point);
+}
+
 /// What the ray in flight found: adds what shines by itself. Returns whether the path goes on from there; then
 /// lanes_.receivers holds the point and beta its albedo.
 bool WaveTracer::shadeHit(int lane, int depth) {
@@ -196,7 +208,7 @@ bool WaveTracer::shadeHit(int lane, int depth) {
         path.beta * transport_.environment.radiance(dir) * misWeight(path.pdf, transport_.environment.pdf(dir));
     return false;
   }
-  const HitSurface hit = transport_.rays.surfaceAt(rays_, lane);
+  const HitSurface& hit = hits_[l];
   if (depth == 0)
     result_.texels[l].sums.countGatherRay(hit.backFace && !transport_.materials.material(hit.material).doubleSided);
   const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
