@@ -4,6 +4,7 @@
 #include <array>
 
 #include "baker/sampling.h"
+#include "scene/parallel.h"
 
 namespace lumel {
 namespace {
@@ -117,35 +118,42 @@ LightSample PunctualLights::sample(const Vec3& p, const Vec3& n, float u) const 
 
 EmissiveTriangles::EmissiveTriangles(RayScene& rays, const Materials& materials)
     : rays_(&rays), materials_(&materials) {
-  std::vector<float> powers;
-  std::vector<float> areas;
   for (std::uint32_t p = 0; p < rays.parts().size(); ++p) {
     ScenePart& part = rays.parts()[p];
     if (!materials.emits(part.primitive->material)) continue;
-    const Material& material = materials.material(part.primitive->material);
     part.firstEmitter = static_cast<std::int64_t>(triangles_.size());
-    for (std::uint32_t t = 0; t < part.primitive->triangleCount(); ++t) {
-      const std::array<Vec3, 3> corners = rays.corners(part, t);
-      Emitter emitter;
-      emitter.corner = corners[0];
-      emitter.e1 = corners[1] - corners[0];
-      emitter.e2 = corners[2] - corners[0];
-      const Vec3 cross = glm::cross(emitter.e1, emitter.e2);
-      emitter.ng = glm::normalize(cross) * part.frontSign;
-      emitter.part = p;
-      emitter.triangle = t;
-      emitter.doubleSided = material.doubleSided;
-      emitter.uniform = !material.emissionMap && !materials.needsAlphaTest(*part.primitive);
-      emitter.radiance = materials.emission({part.primitive, t, Vec2(1.0f / 3)});
-      triangles_.push_back(emitter);
-      areas.push_back(0.5f * glm::length(cross));
-      powers.push_back(areas.back() * meanEmission(materials, *part.primitive, t));
-    }
+    for (std::uint32_t t = 0; t < part.primitive->triangleCount(); ++t)
+      triangles_.push_back({.part = p, .triangle = t});
   }
+  std::vector<float> powers(triangles_.size());
+  std::vector<float> areas(triangles_.size());
+  parallelFor(triangles_.size(), 256, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      areas[i] = describe(triangles_[i]);
+      const Primitive& primitive = *rays.parts()[triangles_[i].part].primitive;
+      const float sides = triangles_[i].doubleSided ? 2.0f : 1.0f;
+      powers[i] = sides * areas[i] * meanEmission(materials, primitive, triangles_[i].triangle);
+    }
+  });
   choice_ = Distribution(powers);
   if (choice_.empty()) return;
   for (std::size_t i = 0; i < triangles_.size(); ++i)
     if (choice_.probability(i) > 0.0f) triangles_[i].densityByArea = choice_.probability(i) / areas[i];
+}
+
+float EmissiveTriangles::describe(Emitter& emitter) const {
+  const ScenePart& part = rays_->parts()[emitter.part];
+  const Material& material = materials_->material(part.primitive->material);
+  const std::array<Vec3, 3> corners = rays_->corners(part, emitter.triangle);
+  emitter.corner = corners[0];
+  emitter.e1 = corners[1] - corners[0];
+  emitter.e2 = corners[2] - corners[0];
+  const Vec3 cross = glm::cross(emitter.e1, emitter.e2);
+  emitter.ng = glm::normalize(cross) * part.frontSign;
+  emitter.doubleSided = material.doubleSided;
+  emitter.uniform = !material.emissionMap && !materials_->needsAlphaTest(*part.primitive);
+  emitter.radiance = materials_->emission({part.primitive, emitter.triangle, Vec2(1.0f / 3)});
+  return 0.5f * glm::length(cross);
 }
 
 Vec3 EmissiveTriangles::radianceAt(const Emitter& emitter, Vec2 barycentric) const {

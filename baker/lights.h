@@ -78,6 +78,8 @@ class EmissiveTriangles {
     bool uniform = false;  // it sends out `radiance` everywhere
     Vec3 radiance{0};
   };
+  /// Fills all but densityByArea from the part and the triangle; returns the area.
+  float describe(Emitter& emitter) const;
   Vec3 radianceAt(const Emitter& emitter, Vec2 barycentric) const;
 
   const RayScene* rays_ = nullptr;

@@ -115,7 +115,9 @@ Expected<void> RayScene::buildGeometry() {
     if (!instance.settings.casts) continue;
     const std::uint32_t firstPart = addParts(static_cast<int>(i));
     if (firstPart == parts_.size()) continue;
-    if (uses[static_cast<std::size_t>(instance.mesh)] == 1) {
+    // Embree inverts the transform of what it places itself; what is flat has no inverse.
+    const bool invertible = std::isnormal(glm::determinant(Mat3(instance.worldFromObject)));
+    if (uses[static_cast<std::size_t>(instance.mesh)] == 1 || !invertible) {
       for (std::uint32_t p = firstPart; p < parts_.size(); ++p) {
         auto geometry = triangles(*parts_[p].primitive, &instance.worldFromObject, &parts_[p].worldPositions);
         if (!geometry) return failure("ray tracing: out of memory for the triangles of '" + instance.name + "'");
