@@ -8,6 +8,7 @@
 
 #include "baker/config_file.h"
 #include "baker/help.h"
+#include "baker/ssbump_command.h"
 #include "baker/terminal_progress.h"
 #include "baker/version.h"
 
@@ -34,7 +35,9 @@ void declare(Parsed& parsed, CLI::App& root) {
     // "--no-NAME" turns off what a config file turned on.
     CLI::Option* declared = option.values == 0 ? app->add_flag(names + ",!--no-" + option.name, texts)
                                                : app->add_option(names, texts)->expected(option.values)->type_size(1);
-    parsed.given[option.name] = declared->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    // The last of a repeated option counts; one positional must not take the next one's text.
+    declared->allow_extra_args(false)->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    parsed.given[option.name] = declared;
   }
   if (parsed.command.takesConfig) app->add_option("--config", parsed.config);
   app->add_flag("--quiet,-q", parsed.quiet);
@@ -74,7 +77,7 @@ Expected<void> fillOptions(Parsed& parsed, const std::set<std::string>& allComma
       option.isGiven = true;
     }
     if (option.required && !option.isGiven)
-      return usageError((option.positional ? option.name : shown + " " + option.placeholder) +
+      return usageError((option.positional ? option.placeholder : shown + " " + option.placeholder) +
                         " is missing; see lumel " + parsed.command.name + " --help");
   }
   return {};
@@ -98,7 +101,7 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
 
   std::vector<std::unique_ptr<Parsed>> commands;
   std::set<std::string> names;
-  for (auto make : {bakeCommand, renderCommand, infoCommand, diffCommand}) {
+  for (auto make : {bakeCommand, ssbumpCommand, renderCommand, infoCommand, diffCommand}) {
     commands.push_back(std::make_unique<Parsed>());
     commands.back()->command = make();
     names.insert(commands.back()->command.name);
