@@ -180,6 +180,8 @@ class Builder {
   }
 
   void fillOpenMesh() {
+    // A face that does not fit is told by add_face's result; OpenMesh would also print it.
+    [[maybe_unused]] static const bool quiet = (omerr().disable(), true);
     OpenMeshMesh mesh;
     const std::size_t count = mesh_.sourceTriangle.size();
     mesh.reserve(count / 2 + 3, 3 * count / 2 + 3, count);
