@@ -8,6 +8,7 @@
 
 #include "baker/config_file.h"
 #include "baker/help.h"
+#include "baker/ssbump_command.h"
 #include "baker/terminal_progress.h"
 #include "baker/version.h"
 
@@ -100,7 +101,7 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
 
   std::vector<std::unique_ptr<Parsed>> commands;
   std::set<std::string> names;
-  for (auto make : {bakeCommand, renderCommand, infoCommand, diffCommand}) {
+  for (auto make : {bakeCommand, renderCommand, ssbumpCommand, infoCommand, diffCommand}) {
     commands.push_back(std::make_unique<Parsed>());
     commands.back()->command = make();
     names.insert(commands.back()->command.name);

@@ -16,6 +16,8 @@ constexpr double kExactReach = 12;   // up to here every edge that the slice cro
 constexpr int kStepsPerOctave = 16;  // beyond kUnitReach: box maxima, the box as wide as the step
 constexpr int kUnitReach = 2 * kStepsPerOctave;  // up to here every crossing along the dominant axis
 
+constexpr std::size_t kStepsPerGroup = 8;  // between the kernel's looks at whether anything higher can come
+
 struct LerpStep {
   int ax, ay, bx, by;  // the two vertices of the crossed edge
   float fraction, inverseDistance;
@@ -29,6 +31,7 @@ struct BoxStep {
 struct Slice {
   std::vector<LerpStep> lerps;
   std::vector<BoxStep> boxes;
+  std::vector<StepGroup> lerpGroups, boxGroups;
   std::vector<LobeSlice> lobes;
 };
 
@@ -60,6 +63,15 @@ LerpStep crossing(double x, double y, int ex, int ey, double distance) {
   return {ax, ay, bx, by, static_cast<float>(fraction), static_cast<float>(1 / distance)};
 }
 
+/// Steps sorted by distance, in groups of kStepsPerGroup.
+template <class Step>
+std::vector<StepGroup> groupsOf(const std::vector<Step>& steps) {
+  std::vector<StepGroup> groups;
+  for (std::size_t s = 0; s < steps.size(); s += kStepsPerGroup)
+    groups.push_back({std::min(steps.size(), s + kStepsPerGroup), steps[s].inverseDistance});
+  return groups;
+}
+
 Slice makeSlice(double phi, int reach, int levels, std::span<const Lobe> lobes) {
   Slice slice;
   const double ux = std::cos(phi), uy = -std::sin(phi);  // image rows run down, b points up
@@ -75,9 +87,13 @@ Slice makeSlice(double phi, int reach, int levels, std::span<const Lobe> lobes) 
   addLines(ux, 0, 1, 0, exact);
   addLines(uy, 1, 0, 0, exact);
   addLines(ux - uy, 1, 1, 0, exact);
+  // Nearest first, so that a group ends where the next begins.
+  std::stable_sort(slice.lerps.begin(), slice.lerps.end(), [](const LerpStep& a, const LerpStep& b) { return a.inverseDistance > b.inverseDistance; });
   const bool alongX = std::abs(ux) >= std::abs(uy);
   const double major = alongX ? ux : uy, minor = alongX ? uy : ux;
   addLines(major, alongX ? 0 : 1, alongX ? 1 : 0, exact, std::min<double>(kUnitReach / std::abs(major), reach));
+
+  slice.lerpGroups = groupsOf(slice.lerps);
 
   for (int level = 1; level <= levels; ++level) {
     const int box = 1 << level;
@@ -94,6 +110,7 @@ Slice makeSlice(double phi, int reach, int levels, std::span<const Lobe> lobes) 
       slice.boxes.push_back({level, alongX ? p : m, alongX ? m : p, static_cast<float>(1 / distance)});
     }
   }
+  slice.boxGroups = groupsOf(slice.boxes);
   for (const Lobe& lobe : lobes) slice.lobes.emplace_back(lobe, phi);
   return slice;
 }
@@ -171,10 +188,13 @@ Image Horizon::occlusion(const TexelRect& rect, std::span<const Lobe> lobes) con
         row.lerpB = pointers.b.data();
         row.fraction = pointers.fraction.data();
         row.lerpInverse = pointers.lerpInverse.data();
-        row.lerpCount = pointers.a.size();
+        row.lerpGroups = slice.lerpGroups.data();
+        row.lerpGroupCount = slice.lerpGroups.size();
         row.box = pointers.box.data();
         row.boxInverse = pointers.boxInverse.data();
-        row.boxCount = pointers.box.size();
+        row.boxGroups = slice.boxGroups.data();
+        row.boxGroupCount = slice.boxGroups.size();
+        row.highest = rows_.field().highest;
         row.slices = slice.lobes.data();
         row.channels = lobes.size();
         row.sums = sumRows.data();

@@ -12,6 +12,7 @@ namespace {
 template <int Lanes>
 struct Simd {
   typedef float Floats __attribute__((vector_size(Lanes * 4)));
+  typedef int Ints __attribute__((vector_size(Lanes * 4)));
 
   static LUMEL_INLINE void load(Floats& v, const float* p) { std::memcpy(&v, p, sizeof v); }
   static LUMEL_INLINE void store(float* p, const Floats& v) { std::memcpy(p, &v, sizeof v); }
@@ -61,18 +62,34 @@ LUMEL_INLINE void accumulate(const HorizonRow& row, int x, const typename Simd<L
   }
 }
 
+constexpr int kVectors = 4;  // independent chains that hide the latency of the maximum
+
+/// True where no lane of the block can find a higher slope at a distance of 1 / inverse or more.
 template <int Lanes>
-LUMEL_INLINE void horizonRowBody(const HorizonRow& row) {
+LUMEL_INLINE bool finished(const typename Simd<Lanes>::Floats* own, const typename Simd<Lanes>::Floats* slope, float highest, float inverse) {
+  using Floats = typename Simd<Lanes>::Floats;
+  Floats most = (highest - own[0]) * inverse - slope[0];
+  for (int v = 1; v < kVectors; ++v) {
+    const Floats m = (highest - own[v]) * inverse - slope[v];
+    most = m > most ? m : most;
+  }
+  typename Simd<Lanes>::Ints lane;
+  for (int i = 0; i < Lanes; ++i) lane[i] = i;
+  for (int half = Lanes / 2; half > 0; half /= 2) {
+    const Floats other = __builtin_shuffle(most, lane ^ half);
+    most = other > most ? other : most;
+  }
+  return most[0] <= 0;
+}
+
+template <int Lanes>
+LUMEL_INLINE void climb(const HorizonRow& row, int x, const typename Simd<Lanes>::Floats* own, typename Simd<Lanes>::Floats* slope) {
   using S = Simd<Lanes>;
   using Floats = typename S::Floats;
-  constexpr int kVectors = 4;  // independent chains that hide the latency of the maximum
-  for (int x = 0; x < row.width; x += Lanes * kVectors) {
-    Floats own[kVectors], slope[kVectors];
-    for (int v = 0; v < kVectors; ++v) {
-      S::load(own[v], row.own + x + v * Lanes);
-      slope[v] = Floats{};
-    }
-    for (std::size_t s = 0; s < row.lerpCount; ++s) {
+  std::size_t s = 0;
+  for (std::size_t g = 0; g < row.lerpGroupCount; ++g) {
+    if (finished<Lanes>(own, slope, row.highest, row.lerpGroups[g].inverse)) return;
+    for (; s < row.lerpGroups[g].end; ++s) {
       const float* pa = row.lerpA[s] + x;
       const float* pb = row.lerpB[s] + x;
       const float fraction = row.fraction[s], inverse = row.lerpInverse[s];
@@ -84,7 +101,11 @@ LUMEL_INLINE void horizonRowBody(const HorizonRow& row) {
         slope[v] = t > slope[v] ? t : slope[v];
       }
     }
-    for (std::size_t s = 0; s < row.boxCount; ++s) {
+  }
+  s = 0;
+  for (std::size_t g = 0; g < row.boxGroupCount; ++g) {
+    if (finished<Lanes>(own, slope, row.highest, row.boxGroups[g].inverse)) return;
+    for (; s < row.boxGroups[g].end; ++s) {
       const float* p = row.box[s] + x;
       const float inverse = row.boxInverse[s];
       for (int v = 0; v < kVectors; ++v) {
@@ -94,6 +115,20 @@ LUMEL_INLINE void horizonRowBody(const HorizonRow& row) {
         slope[v] = t > slope[v] ? t : slope[v];
       }
     }
+  }
+}
+
+template <int Lanes>
+LUMEL_INLINE void horizonRowBody(const HorizonRow& row) {
+  using S = Simd<Lanes>;
+  using Floats = typename S::Floats;
+  for (int x = 0; x < row.width; x += Lanes * kVectors) {
+    Floats own[kVectors], slope[kVectors];
+    for (int v = 0; v < kVectors; ++v) {
+      S::load(own[v], row.own + x + v * Lanes);
+      slope[v] = Floats{};
+    }
+    climb<Lanes>(row, x, own, slope);
     for (int v = 0; v < kVectors; ++v) accumulate<Lanes>(row, x + v * Lanes, slope[v]);
   }
 }

@@ -10,6 +10,13 @@ namespace lumel::ssbump {
 /// Texels that the kernel handles at once: rows are padded to a multiple of this.
 inline constexpr int kHorizonBlock = 64;
 
+/// Steps that begin at one distance: before them a block of texels stops if none of them can find a higher slope there,
+/// that is if (highest - own height) * inverse <= slope for all. Exact: what lies beyond is farther still.
+struct StepGroup {
+  std::size_t end = 0;  // one past the group's last step
+  float inverse = 0;    // 1 / the least distance of its steps
+};
+
 /// One azimuth of one row. Slopes are (height at the step - own height) * inverse distance.
 struct HorizonRow {
   const float* own = nullptr;        // heights of the row's texels
@@ -18,11 +25,14 @@ struct HorizonRow {
   const float* const* lerpB = nullptr;
   const float* fraction = nullptr;
   const float* lerpInverse = nullptr;
-  std::size_t lerpCount = 0;
+  const StepGroup* lerpGroups = nullptr;
+  std::size_t lerpGroupCount = 0;
   // Steps that are one box maximum.
   const float* const* box = nullptr;
   const float* boxInverse = nullptr;
-  std::size_t boxCount = 0;
+  const StepGroup* boxGroups = nullptr;
+  std::size_t boxGroupCount = 0;
+  float highest = 0;  // of the whole field
 
   const LobeSlice* slices = nullptr;  // one per channel
   std::size_t channels = 0;

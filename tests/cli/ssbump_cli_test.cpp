@@ -1,0 +1,142 @@
+// `lumel ssbump` as a user runs it: exit codes, messages, files. LUMEL_BINARY is the built program.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "scene/image_io.h"
+#include "tests/ssbump/fields.h"
+
+namespace lumel::ssbump {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Ran {
+  int code = -1;
+  std::string output;  // standard output and error
+};
+
+class SsbumpCli : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(testing::TempDir()) / (std::string("lumel-cli-ssbump-") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    const HeightField field = fields::fractal(64, 64, 1, 4);
+    Image grey(64, 64, 1);
+    grey.pixels = field.texels;
+    ASSERT_TRUE(writeImage(folder_ / "h.png", grey, {.format = PixelFormat::U16, .channelNames = {}, .metadata = {}}));
+  }
+
+  /// Arguments as on a command line, run in the test's folder.
+  Ran lumel(const std::string& arguments) const {
+    const std::string command = "cd '" + folder_.string() + "' && '" LUMEL_BINARY "' ssbump " + arguments + " 2>&1";
+    std::FILE* pipe = popen(command.c_str(), "r");
+    EXPECT_NE(pipe, nullptr);
+    Ran ran;
+    std::array<char, 512> buffer;
+    while (pipe && std::fgets(buffer.data(), buffer.size(), pipe)) ran.output += buffer.data();
+    const int status = pipe ? pclose(pipe) : -1;
+    ran.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return ran;
+  }
+  bool exists(const std::string& name) const { return fs::exists(folder_ / name); }
+  Image read(const std::string& name) const {
+    auto loaded = readImage(folder_ / name);
+    EXPECT_TRUE(loaded) << name;
+    return loaded ? std::move(loaded->image) : Image();
+  }
+  std::size_t files() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), {})); }
+
+  fs::path folder_;
+};
+
+TEST_F(SsbumpCli, WritesEveryMapThatIsAskedFor) {
+  const Ran ran = lumel("h.png -o s.png --height-scale 10 --save-weights w.tif --save-occlusion o.tga --save-ao ao.png --save-normal n.png "
+                        "--save-recovered r.exr --contact-sheet sheet.png --study study");
+  ASSERT_EQ(ran.code, 0) << ran.output;
+  for (const char* name : {"s.png", "w.tif", "o.tga", "ao.png", "n.png", "r.exr", "sheet.png", "study/study.md", "study/study.png"}) EXPECT_TRUE(exists(name)) << name;
+  EXPECT_NE(ran.output.find("64x64"), std::string::npos);
+}
+
+TEST_F(SsbumpCli, BothMethodsAndAllFormatsAgree) {
+  ASSERT_EQ(lumel("h.png -o a.exr --height-scale 8 --bits float -q").code, 0);
+  ASSERT_EQ(lumel("h.png -o b.exr --height-scale 8 --bits float -q --method rays --rays 1024 --threads 1").code, 0);
+  const Image a = read("a.exr"), b = read("b.exr");
+  double squares = 0;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) squares += std::pow(static_cast<double>(a.pixels[i] - b.pixels[i]), 2);
+  // A weight of about a third times the 0.005 by which 1024 rays err.
+  EXPECT_LT(std::sqrt(squares / static_cast<double>(a.pixels.size())), 0.004);
+  ASSERT_EQ(lumel("h.png -o c.png --height-scale 8 --bits 16 -q").code, 0);
+  const Image c = read("c.png");
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) ASSERT_NEAR(c.pixels[i], a.pixels[i], 1.0 / 65535);
+}
+
+TEST_F(SsbumpCli, ConvertsThereAndBack) {
+  ASSERT_EQ(lumel("h.png -o s.exr --height-scale 8 --bits float -q").code, 0);
+  ASSERT_EQ(lumel("s.exr --convert --to linear --hand left -o l.exr --bits float -q").code, 0);
+  ASSERT_EQ(lumel("l.exr --convert --to squared -o b.exr --bits float -q").code, 0);
+  const Image a = read("s.exr"), b = read("b.exr");
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) ASSERT_NEAR(a.pixels[i], b.pixels[i], 1e-5);
+  ASSERT_EQ(lumel("s.exr --convert --to normal -o n.png -q").code, 0);
+  ASSERT_EQ(lumel("n.png --convert --from normal --to mod2x -o m.png -q").code, 0);
+  ASSERT_EQ(lumel("s.exr --cross-fade b.exr --amount 0.5 -o f.exr -q").code, 0);
+  EXPECT_TRUE(exists("f.exr"));
+}
+
+TEST_F(SsbumpCli, TheCommandLineIsChecked) {
+  for (const char* wrong : {"", "h.png", "h.png -o s.png --method guess", "h.png -o s.png --rays 0", "h.png -o s.png --azimuths 0",
+                            "h.png -o s.png --height-scale tall", "h.png -o s.png --convention cubed", "h.png -o s.jpeg2 ", "h.png -o s.png --bits half",
+                            "h.png -o s.png --cone-angle 400", "h.png -o s.png --unknown", "h.png -o s.png --low x.obj"}) {
+    const Ran ran = lumel(wrong);
+    EXPECT_EQ(ran.code, 2) << wrong << "\n" << ran.output;
+    EXPECT_NE(ran.output.find("lumel"), std::string::npos) << wrong;
+    EXPECT_EQ(files(), 1u) << wrong;
+  }
+  EXPECT_EQ(lumel("--help").code, 0);
+}
+
+TEST_F(SsbumpCli, BadInputIsNamedAndLeavesNothing) {
+  std::ofstream(folder_ / "empty.png");
+  std::ofstream(folder_ / "text.png") << "not an image";
+  Image nan(4, 4, 1, 0.5f), one(1, 1, 1, 0.5f);
+  nan.pixels[5] = HUGE_VALF;
+  ASSERT_TRUE(writeImage(folder_ / "inf.exr", nan, {.format = PixelFormat::Float, .channelNames = {}, .metadata = {}}));
+  ASSERT_TRUE(writeImage(folder_ / "one.png", one, {.format = PixelFormat::U8, .channelNames = {}, .metadata = {}}));
+  ASSERT_EQ(lumel("h.png -o unused.png --save-normal n.png --height-scale 8 -q").code, 0);
+  fs::remove(folder_ / "unused.png");
+  const std::size_t before = files();
+  for (const char* wrong : {"absent.png", "empty.png", "text.png", "inf.exr", "h.png --channel Z", "h.png --height-scale 1e9", "n.png",
+                            "h.png --normal-map h.png", "h.png --mask one.png", "h.png --basis text.png", "h.png --albedo absent.png"}) {
+    const Ran ran = lumel(std::string(wrong) + " -o s.png -q");
+    EXPECT_EQ(ran.code, 3) << wrong << "\n" << ran.output;
+    EXPECT_EQ(std::count(ran.output.begin(), ran.output.end(), '\n'), 1) << wrong << "\n" << ran.output;
+    EXPECT_EQ(files(), before) << wrong;
+  }
+  EXPECT_EQ(lumel("h.png -o absent/s.png -q").code, 1);
+  EXPECT_EQ(files(), before);
+  // What has a correct answer gets it: one texel and scale 0 are flat.
+  for (const char* flat : {"one.png", "h.png --height-scale 0"}) {
+    ASSERT_EQ(lumel(std::string(flat) + " -o flat.exr --bits float -q").code, 0);
+    for (float v : read("flat.exr").pixels) ASSERT_NEAR(v, 1.0 / 3, 1e-6);
+  }
+}
+
+TEST_F(SsbumpCli, MeshesOverAFlatTile) {
+  std::ofstream(folder_ / "tile.obj") << "v 0 0 0\nv 4 0 0\nv 4 0 4\nv 0 0 4\nv 2 0 0\nv 2 1 0\nv 2 1 4\nv 2 0 4\n"
+                                         "f 1 4 3 2\nf 5 6 7 8\n";
+  const Ran ran = lumel("tile.obj -o s.exr --bits float --save-occlusion o.exr --width 16 --height 16 --rays 256 -q");
+  ASSERT_EQ(ran.code, 0) << ran.output;
+  const Image o = read("o.exr");
+  // West of the fence it hides the east (B0), east of it the west.
+  EXPECT_LT(o.at(6, 8)[0], o.at(9, 8)[0] - 0.1f);
+  EXPECT_EQ(lumel("absent.obj -o t.exr -q").code, 3);
+}
+
+}  // namespace
+}  // namespace lumel::ssbump
