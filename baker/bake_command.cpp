@@ -179,7 +179,7 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   BakeRecord record = recordOf(a, dilate, context.settings);
   if (!context.quiet) printSettings(record.settings);
 
-  StageClock clock;
+  StageClock clock(context.quiet);
   Progress& progress = context.progress;
   clock.start("load");
   const auto scene = loadLitScene(a);

@@ -139,7 +139,7 @@ std::string describeBake(const Scene& scene, const AtlasResult& atlas, const Bak
   json["scene"] = describeScene(scene, record);
   json["settings"] = record.settings;
   json["conventions"] = describeConventions(record.bakeOptions.projection);
-  json["conventions"]["aux"] = "channels coverage, validity, stderr, samples";
+  json["conventions"]["aux"] = "channels coverage, validity, stderr, samples, by name (EXR files sort channels)";
   json["sky"] = describeSky(scene.environment);
   json["atlas"] = {{"texelsPerMeter", atlas.atlas.texelsPerMeter},
                    {"charts", atlas.atlas.charts.size()},

@@ -7,6 +7,8 @@
 #include <set>
 
 #include "baker/config_file.h"
+#include "baker/help.h"
+#include "baker/ssbump_command.h"
 #include "baker/terminal_progress.h"
 #include "baker/version.h"
 
@@ -23,49 +25,22 @@ struct Parsed {
   bool quiet = false;
 };
 
-class HelpFormatter : public CLI::Formatter {
- public:
-  HelpFormatter() { column_width(34); }
-  std::string make_option_opts(const CLI::Option* option) const override {
-    return option->get_type_size() == 0 ? "" : " " + option->get_option_text();
-  }
-};
-
-std::string helpOf(const Option& option) {
-  if (option.defaultText.empty() || option.values == 0) return option.help;
-  return option.help + " [" + option.defaultText + "]";
-}
-
-void declare(Parsed& parsed, CLI::App& root, const std::shared_ptr<HelpFormatter>& formatter) {
+void declare(Parsed& parsed, CLI::App& root) {
   CLI::App* app = root.add_subcommand(parsed.command.name, parsed.command.summary);
   parsed.app = app;
-  app->formatter(formatter);
-  app->footer(parsed.command.examples);
-  app->get_help_ptr()->group("General")->description("Print this text and stop");
   for (Option& option : parsed.command.options.all()) {
     std::vector<std::string>& texts = parsed.texts[option.name];
     std::string names = option.positional ? option.name : "--" + option.name;
     if (!option.shortName.empty()) names = "-" + option.shortName + "," + names;
-    CLI::Option* declared = nullptr;
-    if (option.values == 0) {
-      // "--no-NAME" turns off what a config file turned on.
-      declared = app->add_flag(names + ",!--no-" + option.name, texts, option.help)
-                     ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-    } else {
-      declared = app->add_option(names, texts, helpOf(option))
-                     ->expected(option.values)
-                     ->type_size(1)
-                     ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
-                     ->option_text(option.positional ? "" : option.placeholder);
-    }
-    declared->group(option.positional ? "Arguments" : option.group);
+    // "--no-NAME" turns off what a config file turned on.
+    CLI::Option* declared = option.values == 0 ? app->add_flag(names + ",!--no-" + option.name, texts)
+                                               : app->add_option(names, texts)->expected(option.values)->type_size(1);
+    // The last of a repeated option counts; one positional must not take the next one's text.
+    declared->allow_extra_args(false)->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     parsed.given[option.name] = declared;
   }
-  if (parsed.command.takesConfig)
-    app->add_option("--config", parsed.config, "Options from a TOML file; the command line wins over it")
-        ->option_text("FILE")
-        ->group("General");
-  app->add_flag("--quiet,-q", parsed.quiet, "Print nothing but errors")->group("General");
+  if (parsed.command.takesConfig) app->add_option("--config", parsed.config);
+  app->add_flag("--quiet,-q", parsed.quiet);
 }
 
 /// Adds the nearest option name to CLI11's complaint about an unknown one.
@@ -75,7 +50,7 @@ std::string explain(const CLI::ParseError& error, const std::vector<std::string>
   for (char& c : message)
     if (c == '\n') c = ' ';
   if (!parsed) return message + "; see lumel --help";
-  if (error.get_name() == "ExtrasError")
+  if (dynamic_cast<const CLI::ExtrasError*>(&error))
     for (const std::string& argument : arguments) {
       if (argument.rfind("--", 0) != 0) continue;
       const std::string name =
@@ -89,18 +64,20 @@ std::string explain(const CLI::ParseError& error, const std::vector<std::string>
 }
 
 Expected<void> fillOptions(Parsed& parsed, const std::set<std::string>& allCommands) {
-  const std::string prefix = "lumel " + parsed.command.name + ": ";
   if (!parsed.config.empty())
     if (auto done = applyConfig(parsed.config, parsed.command.name, allCommands, parsed.command.options); !done)
       return done;
   for (Option& option : parsed.command.options.all()) {
     const std::string shown = option.positional ? option.name : "--" + option.name;
     if (parsed.given[option.name]->count() > 0) {
+      const std::size_t wanted = option.values == 0 ? 1 : static_cast<std::size_t>(option.values);
+      if (parsed.texts[option.name].size() != wanted)
+        return usageError(shown + ": takes " + std::to_string(wanted) + " values: " + option.placeholder);
       if (const auto problem = option.set(parsed.texts[option.name])) return usageError(shown + ": " + *problem);
       option.isGiven = true;
     }
     if (option.required && !option.isGiven)
-      return usageError((option.positional ? option.name : shown + " " + option.placeholder) +
+      return usageError((option.positional ? option.placeholder : shown + " " + option.placeholder) +
                         " is missing; see lumel " + parsed.command.name + " --help");
   }
   return {};
@@ -112,8 +89,6 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
   CLI::App root(
       "Lumel bakes lightmaps for game levels: path-traced light into three maps per page (radiosity normal mapping).",
       "lumel");
-  const auto formatter = std::make_shared<HelpFormatter>();
-  root.formatter(formatter);
   root.require_subcommand(1);
   root.set_version_flag("--version", std::string("lumel ") + kVersion, "Print the version and stop");
   root.footer(
@@ -126,11 +101,11 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
 
   std::vector<std::unique_ptr<Parsed>> commands;
   std::set<std::string> names;
-  for (auto make : {bakeCommand, renderCommand, infoCommand, diffCommand}) {
+  for (auto make : {bakeCommand, ssbumpCommand, renderCommand, infoCommand, diffCommand}) {
     commands.push_back(std::make_unique<Parsed>());
     commands.back()->command = make();
     names.insert(commands.back()->command.name);
-    declare(*commands.back(), root, formatter);
+    declare(*commands.back(), root);
   }
 
   const auto chosen = [&]() -> Parsed* {
@@ -138,11 +113,13 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
       if (parsed->app->parsed()) return parsed.get();
     return nullptr;
   };
+  if (!arguments.empty() && !arguments[0].starts_with('-') && !names.count(arguments[0]))
+    return usageError("unknown command '" + arguments[0] + "'; see lumel --help");
   try {
     root.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::CallForHelp&) {
     const Parsed* parsed = chosen();
-    out << (parsed ? parsed->app->help() : root.help());
+    out << (parsed ? helpText(parsed->command) : root.help());
     return {};
   } catch (const CLI::CallForVersion& version) {
     out << version.what() << '\n';

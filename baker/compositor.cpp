@@ -128,7 +128,8 @@ struct Compositor::Impl {
 
   RTCRayHit trace(const Vec3& origin, const Vec3& direction, float tnear, bool seesAll) const;
   Hit hitAt(unsigned geometry, unsigned triangle, float u, float v) const;
-  bool showsBack(const Hit& hit, const Vec3& direction) const;
+  Vec3 facing(const Hit& hit) const;
+  bool showsBack(const Hit& hit, const Vec3& direction) const { return glm::dot(facing(hit), direction) > 0.0f; }
   Vec3 tangentNormal(const Hit& hit) const;
   Vec3 worldNormal(const Hit& hit) const;
   Vec3 light(const Hit& hit) const;
@@ -247,10 +248,11 @@ Hit Compositor::Impl::hitAt(unsigned geometry, unsigned triangle, float u, float
   return hit;
 }
 
-bool Compositor::Impl::showsBack(const Hit& hit, const Vec3& direction) const {
+/// Normal of the triangle's front, not of unit length.
+Vec3 Compositor::Impl::facing(const Hit& hit) const {
   const auto& p = hit.shape->positions;
   const Vec3 normal = glm::cross(p[hit.vertices[1]] - p[hit.vertices[0]], p[hit.vertices[2]] - p[hit.vertices[0]]);
-  return (glm::dot(normal, direction) > 0.0f) != hit.shape->mirrored;
+  return hit.shape->mirrored ? -normal : normal;
 }
 
 /// Takes culled backs and cut-out texels out of the ray's way.
@@ -327,6 +329,8 @@ Vec3 Compositor::Impl::radiance(const Vec3& origin, const Vec3& direction, Rende
       sighting->surface = true;
       sighting->distance = query.ray.tfar;
       sighting->primitive = hit.shape->number;
+      const Vec3 normal = glm::normalize(facing(hit));
+      sighting->normal = glm::dot(normal, direction) > 0.0f ? -normal : normal;
     }
     tnear = query.ray.tfar * (1.0f + 1e-5f);
   }
@@ -348,6 +352,7 @@ Expected<Compositor> Compositor::make(const BakedScene& baked) {
 }
 
 const std::vector<std::string>& Compositor::warnings() const { return impl_->warnings; }
+bool Compositor::hasSky() const { return !impl_->baked.scene.environment.isBlack(); }
 Vec3 Compositor::meanLight() const { return impl_->baked.meanFlat; }
 Vec3 Compositor::boundsMin() const { return impl_->least; }
 Vec3 Compositor::boundsMax() const { return impl_->most; }

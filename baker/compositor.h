@@ -36,7 +36,8 @@ struct Sighting {
   bool surface = false;      // else sky
   bool throughBack = false;  // the first thing in the way was the culled back of a surface
   float distance = 0.0f;
-  int primitive = -1;  // number in the scene's file order
+  Vec3 normal{0, 0, 0};  // geometric, unit, towards the eye
+  int primitive = -1;    // number in the scene's file order
   Vec3 radiance{0, 0, 0};
 };
 
@@ -56,6 +57,7 @@ class Compositor {
   Sighting look(const Vec3& origin, const Vec3& direction) const;
 
   const std::vector<std::string>& warnings() const;
+  bool hasSky() const;
   Vec3 meanLight() const;  // mean irradiance / pi of the bake
   Vec3 boundsMin() const;
   Vec3 boundsMax() const;

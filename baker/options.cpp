@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 
 #include "scene/check.h"
 
@@ -13,10 +12,19 @@ namespace {
 using Texts = std::span<const std::string>;
 using Problem = std::optional<std::string>;
 
-std::string shortText(double v) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%g", v);
-  return buffer;
+/// The shortest text that reads back as the same number.
+template <class T>
+std::string shortText(T v) {
+  char buffer[64];
+  return {buffer, std::to_chars(buffer, buffer + sizeof buffer, v).ptr};
+}
+
+/// A float as the double of the same digits, so that 0.4 stays 0.4 in JSON.
+double shortDouble(float v) {
+  const std::string text = shortText(v);
+  double d = 0.0;
+  std::from_chars(text.data(), text.data() + text.size(), d);
+  return d;
 }
 
 template <class T>
@@ -61,7 +69,9 @@ Problem parseColor(Texts texts, Range<float> range, Vec3& out) {
   return {};
 }
 
-nlohmann::ordered_json toJson(const Vec3& v) { return nlohmann::ordered_json::array({v.x, v.y, v.z}); }
+nlohmann::ordered_json toJson(const Vec3& v) {
+  return nlohmann::ordered_json::array({shortDouble(v.x), shortDouble(v.y), shortDouble(v.z)});
+}
 
 std::size_t editDistance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> row(b.size() + 1);
@@ -112,9 +122,9 @@ Option& OptionTable::integer(const std::string& name, std::uint64_t& target, con
 }
 
 Option& OptionTable::number(const std::string& name, float& target, Range<float> range, const std::string& help) {
-  Option o{.name = name, .placeholder = "X", .help = help, .defaultText = shortText(static_cast<double>(target))};
+  Option o{.name = name, .placeholder = "X", .help = help, .defaultText = shortText(target)};
   o.set = [&target, range](Texts texts) { return parseIn(texts[0], range, target); };
-  o.value = [&target] { return nlohmann::ordered_json(target); };
+  o.value = [&target] { return nlohmann::ordered_json(shortDouble(target)); };
   return add(std::move(o));
 }
 
@@ -127,7 +137,7 @@ Option& OptionTable::optionalNumber(const std::string& name, std::optional<float
     target = value;
     return {};
   };
-  o.value = [&target] { return target ? nlohmann::ordered_json(*target) : nlohmann::ordered_json(); };
+  o.value = [&target] { return target ? nlohmann::ordered_json(shortDouble(*target)) : nlohmann::ordered_json(); };
   return add(std::move(o));
 }
 

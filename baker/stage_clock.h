@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 
 #include <chrono>
+#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,9 @@ namespace lumel {
 
 class StageClock {
  public:
+  /// Prints a line for each stage that ends, unless quiet.
+  explicit StageClock(bool quiet) : quiet_(quiet) {}
+
   /// Ends the stage that runs, if any, and starts the next.
   void start(const std::string& stage) {
     stop();
@@ -21,8 +25,10 @@ class StageClock {
     running_ = true;
   }
   void stop() {
-    if (running_) stages_.back().seconds = std::chrono::duration<double>(Clock::now() - started_).count();
+    if (!running_) return;
     running_ = false;
+    stages_.back().seconds = std::chrono::duration<double>(Clock::now() - started_).count();
+    if (!quiet_) std::fprintf(stderr, "%-8s %7.2f s\n", stages_.back().stage.c_str(), stages_.back().seconds);
   }
   const std::vector<StageTime>& stages() const { return stages_; }
 
@@ -31,6 +37,7 @@ class StageClock {
   std::vector<StageTime> stages_;
   Clock::time_point started_;
   bool running_ = false;
+  bool quiet_ = false;
 };
 
 /// Most memory that this process has had resident so far.

@@ -76,13 +76,7 @@ void TerminalProgress::draw(Clock::time_point now) {
   std::fflush(stderr);
 }
 
-void TerminalProgress::end() {
-  if (quiet_ || stage_.empty()) return;
-  clearLine();
-  const double seconds = std::chrono::duration<double>(Clock::now() - started_).count();
-  std::fprintf(stderr, "%-8s %s\n", stage_.c_str(), duration(seconds).c_str());
-  stage_.clear();
-}
+void TerminalProgress::end() { clearLine(); }
 
 void TerminalProgress::clearLine() {
   if (quiet_ || !terminal_) return;

@@ -1,4 +1,4 @@
-// Progress for people: a line with percentage and time left on a terminal, one plain line per stage elsewhere.
+// Progress for people: a line with percentage and time left on a terminal, nothing elsewhere.
 #pragma once
 
 #include <atomic>

@@ -16,7 +16,7 @@ float acesFit(float x) { return std::clamp((x * (2.51f * x + 0.03f)) / (x * (2.4
 float autoExposure(const Image& radiance, const Image& surface) {
   constexpr double kMiddleGrey = 0.16;
   // The brightest part (all but the top two percent) stays within what the curve still separates.
-  constexpr double kHighlight = 4.0;
+  constexpr double kHighlight = 2.5;
   constexpr double kHighlightShare = 0.98;
   std::vector<float> values;
   for (int y = 0; y < radiance.height; ++y)

@@ -17,6 +17,7 @@ constexpr std::array<float, 2> kPitches = {-0.06f, -0.25f};  // radians: eyes re
 
 struct Candidate {
   Camera camera;
+  bool outside = false;
   double score = -1e9;
 };
 
@@ -54,8 +55,13 @@ class Chooser {
   }
 
  private:
-  std::vector<Candidate> inside() const {
+  static constexpr float kDarkShare = 0.06f;
+  static constexpr double kOutsidePenalty = 5.0;
+  static constexpr double kOpen = 0.65;  // less built up than this: better seen from outside
+
+  std::vector<Candidate> inside() {
     std::vector<Candidate> candidates;
+    double places = 0.0, walled = 0.0;
     for (unsigned i = 1; i <= kPlaces; ++i) {
       const Vec3 share(radicalInverse(i, 2), radicalInverse(i, 3), radicalInverse(i, 5));
       const Vec3 start = least_ + share * (most_ - least_);
@@ -69,6 +75,8 @@ class Chooser {
       const float height = std::min(0.5f * room, 0.12f * size_);
       if (!(height > 1e-3f * size_)) continue;
       const Vec3 eye = ground + Vec3(0, height, 0);
+      ++places;
+      walled += wallsAround(eye);
       for (int k = 0; k < kDirections; ++k)
         for (float pitch : kPitches) {
           const float yaw =
@@ -77,7 +85,18 @@ class Chooser {
           candidates.push_back({cameraLookingAt(eye, eye + forward, kInsideFov)});
         }
     }
+    if (places > 0.0) enclosed_ = walled / places;
     return candidates;
+  }
+
+  /// Share of the directions over the horizon, and up, in which something stands.
+  double wallsAround(const Vec3& eye) const {
+    int hits = compositor_.look(eye, Vec3(0, 1, 0)).surface ? 1 : 0;
+    for (int k = 0; k < 8; ++k) {
+      const float yaw = 0.25f * kPi * static_cast<float>(k);
+      if (compositor_.look(eye, Vec3(std::cos(yaw), 0.0f, std::sin(yaw))).surface) ++hits;
+    }
+    return hits / 9.0;
   }
 
   void addOutside(std::vector<Candidate>& candidates) const {
@@ -88,61 +107,82 @@ class Chooser {
         const float azimuth = 2.0f * kPi * static_cast<float>(k) / 16.0f;
         const Vec3 away(std::cos(elevation) * std::sin(azimuth), std::sin(elevation),
                         std::cos(elevation) * std::cos(azimuth));
-        candidates.push_back({cameraLookingAt(center + distance * away, center, kOutsideFov)});
+        candidates.push_back({cameraLookingAt(center + distance * away, center, kOutsideFov), true});
       }
   }
 
   void score(std::vector<Candidate>& candidates, int columns, int rows) const {
     parallelFor(candidates.size(), 8, [&](std::size_t first, std::size_t last) {
-      for (std::size_t i = first; i < last; ++i) candidates[i].score = scoreOf(candidates[i].camera, columns, rows);
+      for (std::size_t i = first; i < last; ++i) candidates[i].score = scoreOf(candidates[i], columns, rows);
     });
   }
 
-  double scoreOf(const Camera& camera, int columns, int rows) const {
+  /// Viewpoint entropy (Vazquez et al. 2001) over patches of the scene, here cells of a grid split by the way they
+  /// face: high where many parts show at similar sizes. Variety of brightness is left out: it would reward noise.
+  double scoreOf(const Candidate& candidate, int columns, int rows) const {
+    const Camera& camera = candidate.camera;
     const float tangent = std::tan(0.5f * camera.yFov);
     const Mat3 turn(camera.worldFromCamera);
     const Vec3 origin(camera.worldFromCamera[3]);
     double sky = 0.0, back = 0.0, near = 0.0, dark = 0.0;
-    std::map<int, double> brightness, depth, primitives;
+    std::map<std::array<int, 4>, double> patches;
+    std::map<int, double> depth, primitives, facings;
+    double stops = 0.0;  // below the mean light of the bake, summed
     for (int y = 0; y < rows; ++y)
       for (int x = 0; x < columns; ++x) {
         const float u =
             (2.0f * (static_cast<float>(x) + 0.5f) / static_cast<float>(columns) - 1.0f) * aspect_ * tangent;
         const float v = (1.0f - 2.0f * (static_cast<float>(y) + 0.5f) / static_cast<float>(rows)) * tangent;
-        const Sighting seen = compositor_.look(origin, glm::normalize(turn * Vec3(u, v, -1.0f)));
+        const Vec3 direction = glm::normalize(turn * Vec3(u, v, -1.0f));
+        const Sighting seen = compositor_.look(origin, direction);
         if (seen.throughBack) ++back;
         if (!seen.surface) {
           ++sky;
           continue;
         }
         if (seen.distance < 0.02f * size_) ++near;
-        const float light = luminance(seen.radiance);
-        if (light < kDarkShare * meanLight_) ++dark;
-        // Half stops of brightness, octaves of distance.
-        ++brightness[static_cast<int>(std::floor(2.0f * std::log2(std::max(light, 1e-6f))))];
+        const float brightness = luminance(seen.radiance);
+        if (brightness < kDarkShare * meanLight_) ++dark;
+        stops += std::clamp(std::log2(meanLight_ / std::max(brightness, 1e-6f * meanLight_)), 0.0f, 6.0f);
         ++depth[static_cast<int>(std::floor(std::log2(std::max(seen.distance / size_, 1e-6f))))];
+        const std::array<int, 4> patch = patchOf(origin + seen.distance * direction, seen);
+        ++patches[patch];
+        ++facings[patch[3]];
         ++primitives[seen.primitive];
       }
     const double total = static_cast<double>(columns) * static_cast<double>(rows);
     if (sky == total) return -1e6;
-    const double skyExcess = std::max(0.0, sky / total - 0.3);
-    return entropy(brightness, total) + 0.6 * entropy(depth, total) + 0.3 * entropy(primitives, total) -
-           3.0 * skyExcess - 4.0 * back / total - 3.0 * near / total - 3.0 * dark / total;
+    const double allowedSky = candidate.outside ? 0.6 : compositor_.hasSky() ? 0.3 : 0.1;
+    const double skyExcess = std::max(0.0, sky / total - allowedSky);
+    return entropy(patches, total) + 0.5 * entropy(depth, total) + 0.5 * entropy(primitives, total) +
+           entropy(facings, total) - 0.08 * stops / total - 3.0 * skyExcess - 4.0 * back / total - 3.0 * near / total -
+           2.0 * dark / total - (candidate.outside ? kOutsidePenalty * (enclosed_ - kOpen) : 0.0);
+  }
+
+  /// Grid cell and the axis that the surface faces most.
+  std::array<int, 4> patchOf(const Vec3& position, const Sighting& seen) const {
+    constexpr float kCells = 12.0f;
+    const Vec3 cell = glm::floor((position - least_) / size_ * kCells);
+    const Vec3 n = glm::abs(seen.normal);
+    const int axis = n.x >= n.y && n.x >= n.z ? 0 : n.y >= n.z ? 1 : 2;
+    return {static_cast<int>(cell.x), static_cast<int>(cell.y), static_cast<int>(cell.z),
+            axis * 2 + (seen.normal[axis] < 0.0f ? 1 : 0)};
   }
 
   /// In nats, of counts that sum to at most `total`.
-  static double entropy(const std::map<int, double>& counts, double total) {
+  template <class Key>
+  static double entropy(const std::map<Key, double>& counts, double total) {
     double sum = 0.0;
     for (const auto& [bin, count] : counts) sum -= count / total * std::log(count / total);
     return sum;
   }
 
-  static constexpr float kDarkShare = 0.02f;
   const Compositor& compositor_;
   const float aspect_;
   const Vec3 least_;
   const Vec3 most_;
   const float size_;
+  double enclosed_ = 0.0;  // how much of the surroundings of a place inside is built up, 0..1
   const float meanLight_ = luminance(compositor_.meanLight());
 };
 

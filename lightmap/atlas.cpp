@@ -53,7 +53,6 @@ class AtlasBuilder {
     report.sceneUvs = uvs.reports;
     std::size_t nextReport = 0;
     for (const SceneUvUse& use : uvs.uses) {
-      const std::string& name = scene_.instances[static_cast<std::size_t>(use.instance)].name;
       if (use.used) {
         while (!report.sceneUvs[nextReport].valid) ++nextReport;
         placed_[static_cast<std::size_t>(use.instance)] =
@@ -62,7 +61,6 @@ class AtlasBuilder {
         generated_.push_back(use.instance);
       }
       if (progress_.cancelled()) return interrupted();
-      (void)name;
     }
     for (const UvReport& uv : report.sceneUvs) {
       if (!uv.valid && options_.uvSource == UvSource::Scene)
@@ -72,8 +70,27 @@ class AtlasBuilder {
         report.warnings.push_back("'" + uv.mesh + "': " + std::to_string(uv.frameCrossingTexels) +
                                   " texels lie in charts that cross a break of the material's tangent frame");
     }
+    sceneDensity_ = meanDensity();
     result_.atlas.pages.assign(static_cast<std::size_t>(uvs.pageCount), {options_.pageSize, options_.pageSize});
     return {};
+  }
+
+  /// Of the scene's own lightmaps, by area; 0 without any.
+  double meanDensity() const {
+    double sum = 0, area = 0;
+    for (std::size_t i = 0; i < placed_.size(); ++i) {
+      if (placed_[i].empty()) continue;
+      const double surface = weightedArea(scene_, scene_.instances[i]);
+      double texels = 0;
+      for (const PlacedTriangle& t : placed_[i]) {
+        const Vec2d e1 = Vec2d(t.uvs[1]) - Vec2d(t.uvs[0]);
+        const Vec2d e2 = Vec2d(t.uvs[2]) - Vec2d(t.uvs[0]);
+        texels += 0.5 * std::abs(e1.x * e2.y - e1.y * e2.x) * options_.pageSize * options_.pageSize;
+      }
+      sum += texels;
+      area += surface;
+    }
+    return area > 0 ? std::sqrt(sum / area) : 0.0;
   }
 
   Expected<void> generateCharts() {
@@ -97,7 +114,7 @@ class AtlasBuilder {
     report.chartSeconds = secondsSince(chartStart);
 
     const auto packStart = Clock::now();
-    Expected<ChartPlaces> places = placeCharts(objects, options_, progress_);
+    Expected<ChartPlaces> places = placeCharts(objects, options_, sceneDensity_ / density, progress_);
     if (!places) return places.error();
     report.packSeconds = secondsSince(packStart);
     result_.atlas.texelsPerMeter = static_cast<float>(density * places->scale);
@@ -162,6 +179,7 @@ class AtlasBuilder {
   Progress& progress_;
   std::vector<int> receivers_;
   std::vector<int> generated_;
+  double sceneDensity_ = 0.0;
   std::vector<std::vector<PlacedTriangle>> placed_;  // per instance of the scene
   AtlasResult result_;
 };

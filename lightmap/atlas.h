@@ -19,7 +19,8 @@ enum class UvSource {
 
 struct AtlasOptions {
   UvSource uvSource = UvSource::Auto;
-  float texelsPerMeter = 0.0f;  // 0: the density that fills one page of pageSize
+  float texelsPerMeter = 0.0f;  // 0: the density that fills one page of pageSize, but no more than the mean density
+                                // of those of the scene's own lightmaps that are used
   int pageSize = 1024;          // texels on a side; a multiple of 4
   int padding = 2;              // texels between charts, at least, and to the page's border half of it
   float maxStretch = 1.25f;     // a chart is split where its largest singular value (relative to uniform) exceeds this
@@ -55,8 +56,9 @@ struct AtlasResult {
 };
 
 /// Unwraps and packs every receiving instance (ObjectSettings::receives, material not unlit, not fully transparent).
-/// Instances whose scene UVs are used each get a page region of their own: one instance set that shares an atlas
-/// across distinct meshes without overlap stays on one page at its given place.
+/// Instances whose scene UVs are used get pages of pageSize before all others, with their UVs as given: instances that
+/// do not overlap share a page (a set unwrapped onto one atlas stays together), others get pages of their own.
+/// A chart may run over several primitives of an instance: it then lies in several surfaces.
 /// Deterministic: the same scene and options give the same atlas for any thread count.
 /// Errors: Usage (page too small for the density asked), Input (UvSource::Scene with invalid UVs), Interrupted.
 Expected<AtlasResult> buildAtlas(const Scene& scene, const AtlasOptions& options, Progress& progress);

@@ -17,17 +17,21 @@ double cornerAngle(Vec3d p, Vec3d a, Vec3d b) {
   return std::atan2(glm::length(glm::cross(a - p, b - p)), glm::dot(a - p, b - p));
 }
 
-/// dP/du of a triangle, unit, and the handedness of (dP/du, up in the image, n). False: its UVs have no area.
-bool uvTangent(const std::array<Vec3d, 3>& p, const std::array<Vec2d, 3>& uv, Vec3d& t, double& handedness) {
+/// dP/du of a triangle, unit, and the handedness of (dP/du, up in the image, n). Returns how far it can be trusted, 0 .. 1:
+/// float UVs are rounded to 6e-8 of the page, so the direction in a triangle thinner than 100 such steps is noise.
+double uvTangent(const std::array<Vec3d, 3>& p, const std::array<Vec2d, 3>& uv, Vec3d& t, double& handedness) {
   const Vec2d e1 = uv[1] - uv[0];
   const Vec2d e2 = uv[2] - uv[0];
   const double area = e1.x * e2.y - e1.y * e2.x;
   const Vec3d along = ((p[1] - p[0]) * e2.y - (p[2] - p[0]) * e1.y) * (area < 0 ? -1.0 : 1.0);
   const double length = glm::length(along);
-  if (area == 0 || !(length > 0)) return false;
+  if (area == 0 || !(length > 0)) return 0.0;
   t = along / length;
   handedness = area < 0 ? 1.0 : -1.0;  // v runs down: counter-clockwise charts have negative area
-  return true;
+  constexpr double kTrustedHeight = 6e-6;
+  const double longest = std::sqrt(std::max({glm::dot(e1, e1), glm::dot(e2, e2), glm::dot(e2 - e1, e2 - e1)}));
+  const double trust = std::min(1.0, std::abs(area) / (longest * kTrustedHeight));
+  return trust * trust * trust;
 }
 
 void setMaterialFrames(const Primitive& primitive, const Mat4& worldFromObject, Surface& surface) {
@@ -84,9 +88,10 @@ void setBakeFrames(const Scene& scene, std::span<Surface> surfaces) {
       }
       Vec3d tangent;
       double hand = 0;
-      if (!uvTangent(p, uv, tangent, hand)) continue;
+      const double trust = uvTangent(p, uv, tangent, hand);
+      if (trust == 0) continue;
       for (std::size_t k = 0; k < 3; ++k) {
-        const double angle = cornerAngle(p[k], p[(k + 1) % 3], p[(k + 2) % 3]);
+        const double angle = trust * cornerAngle(p[k], p[(k + 1) % 3], p[(k + 2) % 3]);
         sums[s][v[k]] += angle * tangent;
         handedness[s][v[k]] += angle * hand;
       }

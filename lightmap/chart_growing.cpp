@@ -5,18 +5,19 @@
 #include <queue>
 #include <unordered_map>
 
+#include "lightmap/chart_mesh.h"
+
 namespace lumel {
 namespace {
 
 constexpr double kThinTexels = 0.5;       // creases of triangles thinner than this fade out: no texel could show them
 constexpr double kSmoothCrease = 0.25;    // weight of a crease that is shaded smooth
+constexpr double kMostCrease = 1.2;       // however small: a little over a right angle
 constexpr double kShapeWeight = 0.002;    // against ragged borders: only decides between merges that are flat alike
 
 struct Region {
-  double area = 0.0;
+  NormalMoments normals;
   double perimeter = 0.0;
-  Vec3d normalSum{0.0};
-  std::array<double, 6> normalMoment{};  // xx yy zz xy xz yz, weighted by area
   Vec3d low{0.0}, high{0.0};
   std::uint32_t node = 0;
   std::vector<std::uint32_t> borders;
@@ -50,16 +51,6 @@ double smallestEigenvalue(const std::array<double, 6>& m) {
   const double determinant = a * (b * c - m[5] * m[5]) - m[3] * (m[3] * c - m[5] * m[4]) + m[4] * (m[3] * m[5] - b * m[4]);
   const double r = std::clamp(determinant / (2 * p * p * p), -1.0, 1.0);
   return mean + 2 * p * std::cos(std::acos(r) / 3 + 2 * std::numbers::pi / 3);
-}
-
-/// Variance of the unit normals along the direction in which they vary least: 0 on planes, cylinders and cones.
-double coneVariance(const Region& a, const Region& b) {
-  const double area = a.area + b.area;
-  const Vec3d n = (a.normalSum + b.normalSum) / area;
-  std::array<double, 6> m;
-  for (std::size_t i = 0; i < 6; ++i) m[i] = (a.normalMoment[i] + b.normalMoment[i]) / area;
-  return std::max(0.0, smallestEigenvalue({m[0] - n.x * n.x, m[1] - n.y * n.y, m[2] - n.z * n.z, m[3] - n.x * n.y,
-                                           m[4] - n.x * n.z, m[5] - n.y * n.z}));
 }
 
 class Grower {
@@ -102,12 +93,7 @@ class Grower {
     regions_.resize(mesh_.size());
     for (std::uint32_t t = 0; t < mesh_.size(); ++t) {
       Region& r = regions_[t];
-      const Vec3d sum = areaNormal(mesh_, t);
-      r.area = 0.5 * glm::length(sum);
-      const Vec3d n = sum / (2 * r.area);
-      r.normalSum = n * r.area;
-      r.normalMoment = {n.x * n.x, n.y * n.y, n.z * n.z, n.x * n.y, n.x * n.z, n.y * n.z};
-      for (double& m : r.normalMoment) m *= r.area;
+      r.normals = NormalMoments(areaNormal(mesh_, t));
       const auto& v = mesh_.triangles[t];
       r.low = glm::min(mesh_.points[v[0]], glm::min(mesh_.points[v[1]], mesh_.points[v[2]]));
       r.high = glm::max(mesh_.points[v[0]], glm::max(mesh_.points[v[1]], mesh_.points[v[2]]));
@@ -136,7 +122,9 @@ class Grower {
         }
         Border& border = borders_[place->second];
         const double length = glm::length(mesh_.points[mesh_.triangles[t][(k + 1) % 3]] - mesh_.points[mesh_.triangles[t][k]]);
-        const double bend = 1 - glm::dot(regions_[t].normalSum, regions_[u].normalSum) / (regions_[t].area * regions_[u].area);
+        const NormalMoments& a = regions_[t].normals;
+        const NormalMoments& b = regions_[u].normals;
+        const double bend = 1 - glm::dot(a.sum, b.sum) / (a.area * b.area);
         const double weight = (mesh_.hard[t][k] ? 1.0 : kSmoothCrease) * std::min(thinness(t), thinness(u));
         border.length += length;
         border.crease += length * weight * std::max(0.0, bend);
@@ -156,12 +144,14 @@ class Grower {
     const Vec3d extent = glm::max(a.high, b.high) - glm::min(a.low, b.low);
     constexpr double kNever = std::numeric_limits<double>::infinity();
     if (std::max({extent.x, extent.y, extent.z}) > options_.largestSide) return kNever;
+    const double area = a.normals.area + b.normals.area;
+    const double slack = smallChartSlack(area);
     const double crease = border.crease / border.length;
-    if (crease > 1 - options_.maxCreaseCosine) return kNever;
-    const double bend = coneVariance(a, b) / options_.maxConeVariance;
-    if (bend > 1) return kNever;
+    if (crease > std::min(kMostCrease, (1 - options_.maxCreaseCosine) * slack)) return kNever;
+    const double bend = NormalMoments(a.normals, b.normals).coneVariance() / options_.maxConeVariance;
+    if (bend > slack) return kNever;
     const double perimeter = a.perimeter + b.perimeter - 2 * border.length;
-    const double roundness = perimeter * perimeter / (4 * std::numbers::pi * (a.area + b.area));
+    const double roundness = perimeter * perimeter / (4 * std::numbers::pi * area);
     return bend + crease + kShapeWeight * roundness;
   }
 
@@ -172,16 +162,13 @@ class Grower {
     Region& into = regions_[keep];
     Region& from = regions_[drop];
     into.perimeter += from.perimeter - 2 * borders_[borderIndex].length;
-    into.area += from.area;
-    into.normalSum += from.normalSum;
-    for (std::size_t i = 0; i < 6; ++i) into.normalMoment[i] += from.normalMoment[i];
+    into.normals = NormalMoments(into.normals, from.normals);
     into.low = glm::min(into.low, from.low);
     into.high = glm::max(into.high, from.high);
     tree_.merges.push_back({into.node, from.node});
     into.node = static_cast<std::uint32_t>(tree_.triangleCount + tree_.merges.size() - 1);
     from.alive = false;
     borders_[borderIndex].alive = false;
-    borderOf_.erase(key(keep, drop));
     for (const std::uint32_t moved : from.borders) moveBorder(moved, drop, keep);
     from.borders = {};
   }
@@ -190,7 +177,6 @@ class Grower {
     Border& border = borders_[moved];
     if (!border.alive) return;
     const std::uint32_t other = border.a == from ? border.b : border.a;
-    borderOf_.erase(key(from, other));
     const auto [place, isNew] = borderOf_.try_emplace(key(to, other), moved);
     if (isNew) {
       border.a = to;
@@ -225,12 +211,29 @@ class Grower {
   const GrowOptions& options_;
   std::vector<Region> regions_;
   std::vector<Border> borders_;
-  std::unordered_map<std::uint64_t, std::uint32_t> borderOf_;  // looked up only, never iterated
+  std::unordered_map<std::uint64_t, std::uint32_t> borderOf_;  // looked up only; keys of merged regions are left behind
   std::priority_queue<Candidate> queue_;
   MergeTree tree_;
 };
 
 }  // namespace
+
+NormalMoments::NormalMoments(const Vec3d& areaNormal) : area(0.5 * glm::length(areaNormal)), sum(0.5 * areaNormal) {
+  const Vec3d n = sum / area;
+  moment = {n.x * sum.x, n.y * sum.y, n.z * sum.z, n.x * sum.y, n.x * sum.z, n.y * sum.z};
+}
+
+NormalMoments::NormalMoments(const NormalMoments& a, const NormalMoments& b) : area(a.area + b.area), sum(a.sum + b.sum) {
+  for (std::size_t i = 0; i < 6; ++i) moment[i] = a.moment[i] + b.moment[i];
+}
+
+double NormalMoments::coneVariance() const {
+  const Vec3d n = sum / area;
+  const std::array<double, 6> outer = {n.x * n.x, n.y * n.y, n.z * n.z, n.x * n.y, n.x * n.z, n.y * n.z};
+  std::array<double, 6> covariance;
+  for (std::size_t i = 0; i < 6; ++i) covariance[i] = moment[i] / area - outer[i];
+  return std::max(0.0, smallestEigenvalue(covariance));
+}
 
 std::vector<std::uint32_t> MergeTree::trianglesBelow(std::uint32_t node) const {
   std::vector<std::uint32_t> found;

@@ -10,9 +10,23 @@
 
 namespace lumel {
 
+/// Sums over a region's triangles by which its bend is judged.
+struct NormalMoments {
+  double area = 0.0;                // texels
+  Vec3d sum{0.0};                   // of normals, weighted by area
+  std::array<double, 6> moment{};   // xx yy zz xy xz yz of normals, weighted by area
+
+  NormalMoments() = default;
+  explicit NormalMoments(const Vec3d& areaNormal);  // of one triangle, twice its area long
+  NormalMoments(const NormalMoments& a, const NormalMoments& b);
+
+  /// Variance of the unit normals along the direction in which they vary least: 0 on planes, cylinders and cones.
+  double coneVariance() const;
+};
+
 struct GrowOptions {
   double largestSide = 1000.0;     // texels: no region's bounding box is longer
-  double maxConeVariance = 0.008;  // of the normals about the best cone; a spherical cap of 45 degrees has 0.007
+  double maxConeVariance = 0.02;  // of the normals about the best cone; a spherical cap of 60 degrees has 0.021
   double maxCreaseCosine = 0.5;    // regions that meet at a sharper angle (mean over their border) stay apart
 };
 

@@ -7,8 +7,8 @@
 namespace lumel {
 namespace {
 
-// A float UV on a page of some thousand texels is known to about 1e-4 texels: thinner flips do not exist in the result.
-constexpr double kFlipTexels = 1e-4;
+// A float UV on a page of some thousand texels is known to about 5e-5 texels: thinner flips do not exist in the result.
+constexpr double kFlipTexels = 5e-5;
 
 std::uint32_t findRoot(std::vector<std::uint32_t>& parent, std::uint32_t x) {
   while (parent[x] != x) x = parent[x] = parent[parent[x]];
@@ -22,25 +22,35 @@ double cornerArea(const std::array<Vec2d, 3>& t) { return cross2(t[1] - t[0], t[
 ChartMesh makeChartMesh(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> triangles) {
   ChartMesh chart;
   chart.meshTriangles = std::move(triangles);
+  const std::vector<std::uint32_t>& all = chart.meshTriangles;
+  chart.neighbours.assign(all.size(), {-1, -1, -1});
+  for (std::uint32_t t = 0; t < all.size(); ++t)
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::int32_t other = mesh.neighbours[all[t]][k];
+      if (other < 0) continue;
+      const auto place = std::lower_bound(all.begin(), all.end(), static_cast<std::uint32_t>(other));
+      if (place != all.end() && *place == static_cast<std::uint32_t>(other))
+        chart.neighbours[t][k] = static_cast<std::int32_t>(place - all.begin());
+    }
+  weldCorners(mesh, chart);
+  return chart;
+}
+
+void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart) {
   const std::size_t count = chart.meshTriangles.size();
-  chart.neighbours.assign(count, {-1, -1, -1});
   std::vector<std::uint32_t> corner(3 * count);
   std::iota(corner.begin(), corner.end(), 0u);
   for (std::uint32_t t = 0; t < count; ++t) {
-    const std::uint32_t source = chart.meshTriangles[t];
+    const auto& mine = mesh.triangles[chart.meshTriangles[t]];
     for (std::uint32_t k = 0; k < 3; ++k) {
-      const std::int32_t other = mesh.neighbours[source][k];
-      if (other < 0) continue;
-      const auto place = std::lower_bound(chart.meshTriangles.begin(), chart.meshTriangles.end(), static_cast<std::uint32_t>(other));
-      if (place == chart.meshTriangles.end() || *place != static_cast<std::uint32_t>(other)) continue;
-      const auto u = static_cast<std::uint32_t>(place - chart.meshTriangles.begin());
-      chart.neighbours[t][k] = static_cast<std::int32_t>(u);
-      // The shared edge runs the other way in the neighbour: corners of equal mesh vertex are one.
-      for (const std::uint32_t mine : {k, (k + 1) % 3})
-        for (std::uint32_t theirs = 0; theirs < 3; ++theirs)
-          if (mesh.triangles[source][mine] == mesh.triangles[*place][theirs]) {
-            const std::uint32_t a = findRoot(corner, 3 * t + mine);
-            const std::uint32_t b = findRoot(corner, 3 * u + theirs);
+      if (chart.neighbours[t][k] < 0) continue;
+      const auto u = static_cast<std::uint32_t>(chart.neighbours[t][k]);
+      const auto& theirs = mesh.triangles[chart.meshTriangles[u]];
+      for (const std::uint32_t i : {k, (k + 1) % 3})
+        for (std::uint32_t j = 0; j < 3; ++j)
+          if (mine[i] == theirs[j]) {
+            const std::uint32_t a = findRoot(corner, 3 * t + i);
+            const std::uint32_t b = findRoot(corner, 3 * u + j);
             corner[std::max(a, b)] = std::min(a, b);
           }
     }
@@ -55,7 +65,6 @@ ChartMesh makeChartMesh(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> tri
     }
     chart.triangles[i / 3][i % 3] = vertexOf[root];
   }
-  return chart;
 }
 
 FlatTriangle layFlat(const ChartMesh& chart, std::size_t triangle) {
@@ -97,6 +106,15 @@ Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, doubl
   result.badShare = bad / total;
   result.l2 = std::sqrt(squares / std::max(total - bad, 1e-300) * (total - bad) / total);
   return result;
+}
+
+double surfaceArea(const ChartMesh& chart) {
+  double area = 0;
+  for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
+    const FlatTriangle flat = layFlat(chart, t);
+    area += 0.5 * flat.x1 * flat.y2;
+  }
+  return area;
 }
 
 void scaleToSurface(const ChartMesh& chart, std::vector<Vec2d>& uvs) {
@@ -310,6 +328,23 @@ class OverlapGrid {
 };
 
 }  // namespace
+
+bool packsWell(Vec2d size, double area, double largestSide) {
+  constexpr double kLargeShare = 0.05;  // of the page, by the box
+  constexpr double kEmptyShare = 0.3;   // of the box
+  if (std::max(size.x, size.y) > largestSide) return false;
+  const double box = size.x * size.y;
+  return box < kLargeShare * largestSide * largestSide || area > kEmptyShare * box;
+}
+
+bool packsWell(std::span<const Vec2d> uvs, double area, double largestSide) {
+  Vec2d low = uvs[0], high = uvs[0];
+  for (const Vec2d uv : uvs) {
+    low = glm::min(low, uv);
+    high = glm::max(high, uv);
+  }
+  return packsWell(high - low, area, largestSide);
+}
 
 bool overlapsItself(const ChartMesh& chart, std::span<const Vec2d> uvs, double tolerance) {
   return chart.triangles.size() > 1 && OverlapGrid(chart, uvs, tolerance).anyOverlap();

@@ -1,6 +1,7 @@
 // One chart as a mesh of its own, and what a flattening does to it. Lengths are in texels.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -21,6 +22,9 @@ struct ChartMesh {
 /// `triangles`: ascending, of `mesh`; connected over its neighbours.
 ChartMesh makeChartMesh(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> triangles);
 
+/// Sets `triangles` and `points` from `meshTriangles` and `neighbours`: corners that meet over a joined edge are one point.
+void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart);
+
 /// A triangle laid into the plane without distortion: corner 0 at the origin, corner 1 on the x axis, corner 2 above.
 struct FlatTriangle {
   double x1 = 0, x2 = 0, y2 = 0;
@@ -34,7 +38,16 @@ struct Stretch {
   double badShare = 0.0;   // share of the surface where a singular value or its inverse exceeds the limit
   std::size_t flipped = 0; // triangles turned over by more than a float UV could lose
 };
+double surfaceArea(const ChartMesh& chart);
 Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, double limit);
+
+/// How much more bend and stretch a chart of this area (texels) may have than a large one, 1 .. 10: distortion that no
+/// texel can resolve matters less than a chart of its own with a gutter around it.
+inline double smallChartSlack(double area) {
+  constexpr double kFullSize = 16.0;
+  constexpr double kMost = 10.0;
+  return area >= kFullSize ? 1.0 : std::min(kMost, kFullSize / std::max(area, 1e-300));
+}
 
 /// Twice the signed area; positive where counter-clockwise with y up.
 inline double cross2(Vec2d a, Vec2d b) { return a.x * b.y - a.y * b.x; }
@@ -44,6 +57,11 @@ void scaleToSurface(const ChartMesh& chart, std::vector<Vec2d>& uvs);
 
 /// Turns the chart so that its dominant border direction, else its smallest rectangle, is along the axes.
 void alignToAxes(const ChartMesh& chart, std::vector<Vec2d>& uvs);
+
+/// Whether a chart of this box and area (texels) is no longer than a page and, if it takes a good part of one, no thin
+/// ring or long bow whose box is mostly empty.
+bool packsWell(Vec2d size, double area, double largestSide);
+bool packsWell(std::span<const Vec2d> uvs, double area, double largestSide);
 
 /// Whether parts of the chart lie on each other by more than `tolerance` texels.
 bool overlapsItself(const ChartMesh& chart, std::span<const Vec2d> uvs, double tolerance);

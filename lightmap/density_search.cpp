@@ -1,6 +1,8 @@
 #include "lightmap/density_search.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 namespace lumel {
@@ -42,14 +44,14 @@ class Placer {
     return places;
   }
 
-  /// The largest density at which everything fits one page, to 1 %.
-  Expected<ChartPlaces> fillOnePage() {
+  /// The largest density, up to mostScale, at which everything fits one page, to 1 %.
+  Expected<ChartPlaces> fillOnePage(double mostScale) {
     constexpr double kStep = 1.2;
     constexpr double kPrecision = 1.01;
     constexpr int kMostAttempts = 40;
     std::optional<ChartPlaces> best;
     double fits = 0, tooLarge = 0;
-    double scale = 1.0;
+    double scale = std::min(1.0, mostScale);
     for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
       Expected<ChartPlaces> places = placeAt(scale, true);
       if (places) {
@@ -60,11 +62,11 @@ class Placer {
       } else {
         tooLarge = scale;
       }
-      if (fits > 0 && tooLarge > 0 && tooLarge < fits * kPrecision) break;
+      if (fits >= mostScale || (fits > 0 && tooLarge > 0 && tooLarge < fits * kPrecision)) break;
       if (fits > 0 && tooLarge > 0)
         scale = std::sqrt(fits * tooLarge);
       else
-        scale *= fits > 0 ? kStep : 1 / kStep;
+        scale = fits > 0 ? std::min(scale * kStep, mostScale) : scale / kStep;
     }
     if (best) return std::move(*best);
     return usageError("the charts do not fit one page of " + std::to_string(options_.pageSize) +
@@ -105,9 +107,9 @@ double guessDensity(double area, int pageSize) {
   return std::sqrt(kShare * pageSize * pageSize / area);
 }
 
-Expected<ChartPlaces> placeCharts(const ObjectLayouts& objects, const AtlasOptions& options, Progress& progress) {
+Expected<ChartPlaces> placeCharts(const ObjectLayouts& objects, const AtlasOptions& options, double mostScale, Progress& progress) {
   Placer placer(objects, options, progress);
-  return options.texelsPerMeter > 0 ? placer.placeAt(1.0, false) : placer.fillOnePage();
+  return options.texelsPerMeter > 0 ? placer.placeAt(1.0, false) : placer.fillOnePage(mostScale > 0 ? mostScale : std::numeric_limits<double>::infinity());
 }
 
 }  // namespace lumel

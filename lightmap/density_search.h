@@ -37,7 +37,8 @@ struct ChartPlaces {
   double scale = 1.0;                      // found: multiplies the density that objects were laid out for
 };
 
+/// `mostScale` bounds a searched density: what scene-supplied lightmaps beside it have. 0: no bound.
 /// Errors: Usage (a chart larger than a page; charts too many for one page at any density), Interrupted.
-Expected<ChartPlaces> placeCharts(const ObjectLayouts& objects, const AtlasOptions& options, Progress& progress);
+Expected<ChartPlaces> placeCharts(const ObjectLayouts& objects, const AtlasOptions& options, double mostScale, Progress& progress);
 
 }  // namespace lumel

@@ -13,6 +13,7 @@ constexpr double kThinTexels = 0.01;      // triangles thinner than this may sta
 constexpr double kOverlapTexels = 2e-3;   // parts may lie on each other by less: far below a sample's distance
 constexpr double kMaxBadShare = 0.004;    // of a chart's surface, beyond the stretch limit
 constexpr double kMaxL2 = 1.03;
+constexpr double kSettledTexels = 0.01;   // root mean square: a relaxation that moves less has arrived
 constexpr int kMaxIterations = 30;
 
 Vec3d chartNormal(const ChartMesh& chart) {
@@ -179,7 +180,7 @@ class RigidRelaxation {
       cosine += weight[k] * glm::dot(e[k], now);
       sine += weight[k] * cross2(e[k], now);
     }
-    const double length = std::hypot(cosine, sine);
+    const double length = std::sqrt(cosine * cosine + sine * sine);
     if (length > 0) {
       cosine /= length;
       sine /= length;
@@ -201,8 +202,9 @@ class RigidRelaxation {
 };
 
 bool isGood(const ChartMesh& chart, std::span<const Vec2d> uvs, const FlattenOptions& options) {
-  const Stretch stretch = measureStretch(chart, uvs, options.maxStretch);
-  return stretch.flipped == 0 && stretch.badShare <= kMaxBadShare && stretch.l2 <= kMaxL2;
+  const double slack = smallChartSlack(surfaceArea(chart));
+  const Stretch stretch = measureStretch(chart, uvs, options.maxStretch * std::sqrt(slack));
+  return stretch.flipped == 0 && stretch.badShare <= kMaxBadShare * slack && stretch.l2 <= 1 + (kMaxL2 - 1) * slack;
 }
 
 /// Whether unrolling alone was as good as isometric.
@@ -219,19 +221,10 @@ bool relax(const ChartMesh& chart, std::vector<Vec2d>& uvs, const FlattenOptions
   for (int i = 0; i < kMaxIterations; ++i) {
     const double moved = relaxation.step(uvs);
     if (moved < 0) return false;
-    if (moved < 0.01) break;  // texels
+    if (moved < kSettledTexels) break;
   }
   scaleToSurface(chart, uvs);
   return isGood(chart, uvs, options);
-}
-
-bool fits(std::span<const Vec2d> uvs, double largestSide) {
-  Vec2d low = uvs[0], high = uvs[0];
-  for (const Vec2d uv : uvs) {
-    low = glm::min(low, uv);
-    high = glm::max(high, uv);
-  }
-  return std::max(high.x - low.x, high.y - low.y) <= largestSide;
 }
 
 }  // namespace
@@ -263,7 +256,7 @@ Flattening flatten(const ChartMesh& chart, const FlattenOptions& options) {
     if (!good || overlapsItself(chart, result.uvs, kOverlapTexels)) return result;
   }
   alignToAxes(chart, result.uvs);
-  result.valid = fits(result.uvs, options.largestSide);
+  result.valid = packsWell(result.uvs, surfaceArea(chart), options.largestSide);
   return result;
 }
 

@@ -9,7 +9,7 @@ namespace lumel {
 namespace {
 
 constexpr double kDegenerateArea = 1e-12;  // of the longest edge's square: below the rounding of float coordinates
-constexpr float kFrameCos = 0.9986f;       // tangents more than 3 degrees apart are two frames
+constexpr float kFrameCos = 0.9965f;       // tangents more than 4.8 degrees apart are two frames
 constexpr float kHardCos = 0.9986f;
 constexpr double kFoldCos = -0.5;  // sheets of a non-manifold edge are paired unless they fold back on each other
 
@@ -82,6 +82,9 @@ class Builder {
       }
       mesh_.sourceTriangle.push_back(t);
       normals_.push_back(Vec3(areaNormal / (2 * area)));
+      bool back = true;
+      for (std::size_t k = 0; k < 3; ++k) back = back && glm::dot(soup_.normals[v[k]], normals_.back()) < 0;
+      shadedFromBehind_.push_back(back);
     }
   }
 
@@ -90,6 +93,8 @@ class Builder {
     const std::uint32_t a[2] = {vertexAt(cornerA), vertexAt(nextCorner(cornerA))};
     const std::uint32_t b[2] = {vertexAt(nextCorner(cornerB)), vertexAt(cornerB)};
     hard = false;
+    // Normals are turned to the front as a whole triangle's: beside one that is not, the frame turns over.
+    if (shadedFromBehind_[cornerA / 3] != shadedFromBehind_[cornerB / 3]) return false;
     for (int i = 0; i < 2; ++i) {
       if (a[i] == b[i]) continue;
       if (glm::dot(soup_.normals[a[i]], soup_.normals[b[i]]) < kHardCos) hard = true;
@@ -179,25 +184,46 @@ class Builder {
     const std::size_t count = mesh_.sourceTriangle.size();
     mesh.reserve(count / 2 + 3, 3 * count / 2 + 3, count);
     std::vector<int> vertexOfFan(fan_.size(), -1);
+    mesh_.triangles.resize(count);
     for (std::uint32_t corner = 0; corner < fan_.size(); ++corner) {
-      const std::uint32_t root = findRoot(fan_, corner);
-      if (vertexOfFan[root] < 0) vertexOfFan[root] = addVertex(mesh, corner);
+      int& vertex = vertexOfFan[findRoot(fan_, corner)];
+      if (vertex < 0) {
+        vertex = mesh.add_vertex({}).idx();
+        mesh_.points.push_back(soup_.points[vertexAt(corner)]);
+      }
+      mesh_.triangles[corner / 3][corner % 3] = static_cast<std::uint32_t>(vertex);
     }
-    for (std::uint32_t t = 0; t < count; ++t) {
+    std::vector<std::uint32_t> triangleOfFace;
+    std::vector<std::uint32_t> misfits;
+    for (const std::uint32_t t : sheetOrder()) {
       std::array<OpenMesh::VertexHandle, 3> v;
-      for (std::uint32_t k = 0; k < 3; ++k) v[k] = OpenMesh::VertexHandle(vertexOfFan[findRoot(fan_, 3 * t + k)]);
-      if (fits(mesh, v) && mesh.add_face(v.data(), 3).is_valid()) continue;
-      // The sheet meets itself here, with its sides taken: the triangle becomes a part of its own.
-      for (std::uint32_t k = 0; k < 3; ++k) v[k] = OpenMesh::VertexHandle(addVertex(mesh, 3 * t + k));
-      ++mesh_.isolatedTriangles;
-      mesh.add_face(v.data(), 3);
+      for (std::size_t k = 0; k < 3; ++k) v[k] = OpenMesh::VertexHandle(static_cast<int>(mesh_.triangles[t][k]));
+      if (fits(mesh, v) && mesh.add_face(v.data(), 3).is_valid())
+        triangleOfFace.push_back(t);
+      else
+        misfits.push_back(t);
     }
-    readBack(mesh);
+    readNeighbours(mesh, triangleOfFace, misfits);
   }
 
-  int addVertex(OpenMeshMesh& mesh, std::uint32_t corner) {
-    mesh_.points.push_back(soup_.points[vertexAt(corner)]);
-    return mesh.add_vertex({}).idx();
+  /// Triangles so that each one but the first of a sheet has a neighbour before it: OpenMesh links faces around a vertex
+  /// as they come, and cannot always join patches that began apart.
+  std::vector<std::uint32_t> sheetOrder() const {
+    std::vector<std::uint32_t> order;
+    std::vector<bool> seen(mesh_.sourceTriangle.size(), false);
+    for (std::uint32_t start = 0; start < seen.size(); ++start) {
+      if (seen[start]) continue;
+      seen[start] = true;
+      order.push_back(start);
+      for (std::size_t head = order.size() - 1; head < order.size(); ++head)
+        for (std::uint32_t k = 0; k < 3; ++k) {
+          const std::int32_t paired = opposite_[3 * order[head] + k];
+          if (paired < 0 || seen[static_cast<std::size_t>(paired / 3)]) continue;
+          seen[static_cast<std::size_t>(paired / 3)] = true;
+          order.push_back(static_cast<std::uint32_t>(paired / 3));
+        }
+    }
+    return order;
   }
 
   /// Whether add_face would keep the mesh manifold.
@@ -210,36 +236,36 @@ class Builder {
     return true;
   }
 
-  void readBack(const OpenMeshMesh& mesh) {
-    const std::size_t count = mesh_.sourceTriangle.size();
-    mesh_.triangles.resize(count);
-    mesh_.neighbours.assign(count, {-1, -1, -1});
-    for (std::uint32_t t = 0; t < count; ++t) {
-      auto halfedge = mesh.halfedge_handle(OpenMesh::FaceHandle(static_cast<int>(t)));
-      // add_face may start at any corner: turn until it runs from the first one.
-      for (int turn = 0; turn < 3; ++turn, halfedge = mesh.next_halfedge_handle(halfedge)) {
-        const auto from = static_cast<std::uint32_t>(mesh.from_vertex_handle(halfedge).idx());
-        const std::uint32_t k = cornerOf(t, from, static_cast<std::uint32_t>(turn));
-        mesh_.triangles[t][k] = from;
-        const auto other = mesh.face_handle(mesh.opposite_halfedge_handle(halfedge));
+  void readNeighbours(const OpenMeshMesh& mesh, const std::vector<std::uint32_t>& triangleOfFace, const std::vector<std::uint32_t>& misfits) {
+    mesh_.neighbours.assign(mesh_.triangles.size(), {-1, -1, -1});
+    for (std::uint32_t face = 0; face < triangleOfFace.size(); ++face) {
+      const std::uint32_t t = triangleOfFace[face];
+      for (std::uint32_t k = 0; k < 3; ++k) {
         const std::int32_t paired = opposite_[3 * t + k];
+        if (paired < 0) continue;
+        const auto halfedge = mesh.find_halfedge(OpenMesh::VertexHandle(static_cast<int>(mesh_.triangles[t][k])),
+                                                 OpenMesh::VertexHandle(static_cast<int>(mesh_.triangles[t][(k + 1) % 3])));
+        const auto other = mesh.face_handle(mesh.opposite_halfedge_handle(halfedge));
         // Two fans may share both ends of an edge that is a break: only paired sides are neighbours.
-        if (other.is_valid() && paired >= 0 && paired / 3 == other.idx()) mesh_.neighbours[t][k] = other.idx();
+        if (other.is_valid() && triangleOfFace[static_cast<std::size_t>(other.idx())] == static_cast<std::uint32_t>(paired / 3))
+          mesh_.neighbours[t][k] = paired / 3;
       }
     }
-  }
-
-  std::uint32_t cornerOf(std::uint32_t triangle, std::uint32_t vertex, std::uint32_t guess) const {
-    for (std::uint32_t i = 0; i < 3; ++i) {
-      const std::uint32_t k = (guess + i) % 3;
-      if (mesh_.points[vertex] == soup_.points[vertexAt(3 * triangle + k)]) return k;
-    }
-    return guess;
+    // OpenMesh knows one edge between two vertices. A sheet that meets itself at both ends of an edge has two there;
+    // for its triangles the pairing made here stands.
+    mesh_.selfMeetingTriangles = misfits.size();
+    for (const std::uint32_t t : misfits)
+      for (std::uint32_t k = 0; k < 3; ++k)
+        if (const std::int32_t paired = opposite_[3 * t + k]; paired >= 0) {
+          mesh_.neighbours[t][k] = paired / 3;
+          mesh_.neighbours[static_cast<std::size_t>(paired / 3)][static_cast<std::size_t>(paired % 3)] = static_cast<std::int32_t>(t);
+        }
   }
 
   const TriangleSoup& soup_;
   std::vector<std::uint32_t> welded_;
   std::vector<Vec3> normals_;            // per kept triangle
+  std::vector<bool> shadedFromBehind_;   // per kept triangle: all its normals point away from its front
   std::vector<std::int32_t> opposite_;   // per corner: the corner of the paired side, or -1
   std::vector<std::uint32_t> fan_;       // per corner: union-find over corners joined around a point
   HalfEdgeMesh mesh_;

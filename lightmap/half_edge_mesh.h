@@ -30,7 +30,7 @@ struct HalfEdgeMesh {
   std::vector<std::uint32_t> sourceTriangle;            // into the soup
   std::size_t degenerateTriangles = 0;                  // no area: less than 1e-12 of the longest edge's square
   std::size_t nonManifoldEdges = 0;                     // more than two sides, or two of contrary winding
-  std::size_t isolatedTriangles = 0;                    // could only be kept as a part of their own
+  std::size_t selfMeetingTriangles = 0;                 // of sheets that meet themselves at both ends of an edge
 
   std::size_t size() const { return triangles.size(); }
 };

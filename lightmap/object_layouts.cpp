@@ -46,22 +46,34 @@ bool sameShape(const Shape& a, const Shape& b) {
 
 }  // namespace
 
+namespace {
+
+/// `v` made a unit vector, through double: transforms of tiny or huge instances leave float's range when squared.
+Vec3 unitOr(const Vec3& v, const Vec3& otherwise) {
+  const Vec3d d(v);
+  const double length = glm::length(d);
+  return length > 0 && std::isfinite(length) ? Vec3(d / length) : otherwise;
+}
+
+}  // namespace
+
 TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texelsPerMeter, std::vector<SourceTriangle>& source) {
   TriangleSoup soup;
   const Mat3d linear = Mat3d(Mat3(instance.worldFromObject)) * densityOf(instance, texelsPerMeter);
   const bool mirrors = glm::determinant(linear) < 0;
+  const Mat3 objectFromWorld = glm::inverse(Mat3(instance.worldFromObject));
   const std::vector<Primitive>& primitives = scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives;
   for (std::size_t p = 0; p < primitives.size(); ++p) {
     const Primitive& primitive = primitives[p];
     if (!receivesLight(scene, instance, primitive)) continue;
     const auto base = static_cast<std::uint32_t>(soup.positions.size());
     soup.positions.insert(soup.positions.end(), primitive.positions.begin(), primitive.positions.end());
-    soup.normals.insert(soup.normals.end(), primitive.normals.begin(), primitive.normals.end());
+    for (const Vec3& n : primitive.normals) soup.normals.push_back(unitOr(n * objectFromWorld, n));
     for (const Vec3& position : primitive.positions) soup.points.push_back(linear * Vec3d(position));
-    if (hasMaterialFrame(primitive))
-      soup.frames.insert(soup.frames.end(), primitive.tangents.begin(), primitive.tangents.end());
-    else
-      soup.frames.resize(soup.positions.size(), Vec4(0.0f));
+    soup.frames.resize(soup.positions.size(), Vec4(0.0f));
+    if (hasMaterialFrame(primitive))  // as they will be baked: at right angles to the normal
+      for (std::size_t i = 0; i < primitive.positions.size(); ++i)
+        soup.frames[base + i] = Vec4(frameFromTangent(primitive.normals[i], primitive.tangents[i]).t, primitive.tangents[i].w < 0 ? -1.0f : 1.0f);
     for (std::uint32_t t = 0; t < primitive.triangleCount(); ++t) {
       source.push_back({static_cast<int>(p), t});
       for (const std::uint32_t k : {0u, mirrors ? 2u : 1u, mirrors ? 1u : 2u})

@@ -15,15 +15,15 @@ namespace lumel {
 /// A flattened chart to place: its triangles in texels, in any position.
 struct PackShape {
   std::vector<std::array<Vec2, 3>> triangles;
-  std::uint32_t group = 0;   // charts of one group (object) are kept on one page where they fit
-  bool mayRotate = true;     // by quarter turns; false where the tangent convention forbids it
+  std::uint32_t group = 0;  // charts of one group (object) are kept on one page where they fit
+  bool mayRotate = true;    // by quarter turns; false where the tangent convention forbids it
 };
 
 struct PackOptions {
   int pageSize = 1024;
-  int maxPages = 0;      // 0: as many as needed
-  int padding = 2;       // texels between any two charts' covered texels, and half of it (rounded up) to the border
-  int blockAlign = 0;    // charts start on multiples of this, and no block holds texels of two charts; 0 = off
+  int maxPages = 0;        // 0: as many as needed
+  int padding = 2;         // texels between any two charts' covered texels, and half of it (rounded up) to the border
+  int blockAlign = 0;      // charts start on multiples of this, and no block holds texels of two charts; 0 = off
   bool shrinkLast = true;  // the last page gets the smallest power-of-two sides that hold its charts
 };
 
@@ -41,8 +41,8 @@ struct Placement {
 };
 
 struct PackResult {
-  std::vector<Placement> placements;       // one per shape
-  std::vector<std::array<int, 2>> pages;   // width, height
+  std::vector<Placement> placements;      // one per shape
+  std::vector<std::array<int, 2>> pages;  // width, height
 };
 
 /// Places every shape so that their conservatively rasterised texels stay `padding` apart. Deterministic.

@@ -13,11 +13,12 @@ namespace lumel {
 enum class Projection {
   Raw,   // K_i = max(0, w.B_i)
   Flat,  // raw, then scaled per texel and colour so that the maps' mean is the flat irradiance / pi (default)
-  Fit,   // least squares for the squared decode, non-negative, exact at the flat normal
+  Fit,   // least squares for the squared decode over normals within 30 degrees of flat, non-negative, exact at flat
 };
 
 /// Evaluates the three kernels for a unit direction in tangent space. Directions with w.z <= 0 (below the surface)
-/// give zero: light comes from above the surface only.
+/// give zero: light comes from above the surface only. Fit interpolates a table, within 5e-4 of the exact kernels; its
+/// three add up to 3 w.z to rounding. Flat's kernels are Raw's (finishTexel does the rest).
 class RnmKernels {
  public:
   explicit RnmKernels(Projection projection);
@@ -29,8 +30,9 @@ class RnmKernels {
  private:
   Projection projection_;
   float bound_ = 1.0f;
-  std::vector<Vec3> table_;  // Fit: kernel values over directions
-  int tableSize_ = 0;
+  // Fit: the kernels before their constraints are matrix_ * direction, plus table_ near the horizon.
+  Mat3 matrix_{1.0f};
+  std::vector<Vec3> table_;
 };
 
 /// What becomes of a texel's three sums: for Flat, scales rnm so that its mean is `flat` in each colour (where the

@@ -3,62 +3,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lightmap/uv_points.h"
+
 namespace lumel {
 namespace {
 
-constexpr int kPointsPerTexel = 4;  // per axis
 constexpr std::size_t kUvSet = 1;
 constexpr float kRangeTolerance = 1e-5f;       // of the page: rounding of normalised 16-bit UVs
 constexpr double kOverlapShare = 0.001;
-constexpr double kOverlapTexels = 4.0;
+constexpr double kOverlapTexels = 16.0;
 constexpr double kLostSurfaceShare = 0.01;     // surface that the UVs leave without area
-
-/// Sample points of a page; triangles are marked with the half-open rule.
-class PointSet {
- public:
-  explicit PointSet(int pageSize) : side_(pageSize * kPointsPerTexel), bits_((static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_) + 63) / 64, 0) {}
-
-  /// Calls visit(index) for every point inside the triangle.
-  template <class Visit>
-  void forEachPoint(const std::array<Vec2d, 3>& uv, Visit visit) const {
-    std::array<Vec2d, 3> p;
-    for (std::size_t k = 0; k < 3; ++k) p[k] = uv[k] * static_cast<double>(side_) - 0.5;  // points at whole numbers
-    const double top = std::min({p[0].y, p[1].y, p[2].y});
-    const double bottom = std::max({p[0].y, p[1].y, p[2].y});
-    const int firstRow = std::max(0, static_cast<int>(std::ceil(top)));
-    const int lastRow = std::min(side_ - 1, static_cast<int>(std::ceil(bottom)) - 1);
-    for (int y = firstRow; y <= lastRow; ++y) {
-      double left = std::numeric_limits<double>::infinity(), right = -left;
-      for (std::size_t k = 0; k < 3; ++k) {
-        // Edges run from low to high so that both triangles of an edge compute the same crossing.
-        const Vec2d a = p[k].y < p[(k + 1) % 3].y ? p[k] : p[(k + 1) % 3];
-        const Vec2d b = p[k].y < p[(k + 1) % 3].y ? p[(k + 1) % 3] : p[k];
-        if (!(a.y <= y && y < b.y)) continue;
-        const double x = a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x);
-        left = std::min(left, x);
-        right = std::max(right, x);
-      }
-      if (!(left < right)) continue;
-      const int firstColumn = std::max(0, static_cast<int>(std::ceil(left)));
-      const int lastColumn = std::min(side_ - 1, static_cast<int>(std::ceil(right)) - 1);
-      for (int x = firstColumn; x <= lastColumn; ++x)
-        visit(static_cast<std::size_t>(y) * static_cast<std::size_t>(side_) + static_cast<std::size_t>(x));
-    }
-  }
-
-  bool test(std::size_t i) const { return (bits_[i / 64] >> (i % 64)) & 1u; }
-  void set(std::size_t i) { bits_[i / 64] |= std::uint64_t{1} << (i % 64); }
-
- private:
-  int side_;
-  std::vector<std::uint64_t> bits_;
-};
-
-constexpr double kTexelsPerPoint = 1.0 / (kPointsPerTexel * kPointsPerTexel);
 
 struct Examination {
   UvReport report;
-  std::vector<std::array<Vec2d, 3>> triangles;
+  std::vector<std::array<Vec2d, 3>> triangles;  // texels
 };
 
 bool tolerable(double overlapTexels, double coveredTexels) {
@@ -92,6 +50,7 @@ Examination examine(const Scene& scene, const Instance& instance, int pageSize) 
       surface += area;
       const double uvArea = (uv[1].x - uv[0].x) * (uv[2].y - uv[0].y) - (uv[1].y - uv[0].y) * (uv[2].x - uv[0].x);
       if (uvArea != 0) {
+        for (Vec2d& q : uv) q *= static_cast<double>(pageSize);
         result.triangles.push_back(uv);
       } else if (area > 0) {
         ++report.zeroAreaTriangles;
@@ -100,11 +59,11 @@ Examination examine(const Scene& scene, const Instance& instance, int pageSize) 
     }
   }
   if (report.outOfRangeVertices > 0) return result;
-  PointSet points(pageSize);
+  UvPoints points(pageSize, pageSize);
   for (const std::array<Vec2d, 3>& uv : result.triangles)
-    points.forEachPoint(uv, [&](std::size_t i) {
-      if (points.test(i)) report.overlapTexels += kTexelsPerPoint;
-      else report.coveredTexels += kTexelsPerPoint;
+    points.forEach(uv, [&](std::size_t i) {
+      if (points.test(i)) report.overlapTexels += UvPoints::kTexelsPerPoint;
+      else report.coveredTexels += UvPoints::kTexelsPerPoint;
       points.set(i);
     });
   report.valid = !result.triangles.empty() && lost <= kLostSurfaceShare * surface &&
@@ -123,7 +82,7 @@ bool receivesLight(const Scene& scene, const Instance& instance, const Primitive
 
 SceneUvs examineSceneUvs(const Scene& scene, const std::vector<int>& receivers, const AtlasOptions& options) {
   SceneUvs result;
-  std::vector<PointSet> pages;
+  std::vector<UvPoints> pages;
   for (const int index : receivers) {
     const Instance& instance = scene.instances[static_cast<std::size_t>(index)];
     SceneUvUse use{index, false, 0};
@@ -133,13 +92,13 @@ SceneUvs examineSceneUvs(const Scene& scene, const std::vector<int>& receivers, 
       if (examined.report.valid) {
         use.used = true;
         for (;; ++use.page) {
-          if (static_cast<std::size_t>(use.page) == pages.size()) pages.emplace_back(options.pageSize);
-          PointSet& page = pages[static_cast<std::size_t>(use.page)];
+          if (static_cast<std::size_t>(use.page) == pages.size()) pages.emplace_back(options.pageSize, options.pageSize);
+          UvPoints& page = pages[static_cast<std::size_t>(use.page)];
           double taken = 0;
           for (const auto& uv : examined.triangles)
-            page.forEachPoint(uv, [&](std::size_t i) { taken += page.test(i) ? kTexelsPerPoint : 0.0; });
+            page.forEach(uv, [&](std::size_t i) { taken += page.test(i) ? UvPoints::kTexelsPerPoint : 0.0; });
           if (!tolerable(std::max(0.0, taken), examined.report.coveredTexels)) continue;
-          for (const auto& uv : examined.triangles) page.forEachPoint(uv, [&page](std::size_t i) { page.set(i); });
+          for (const auto& uv : examined.triangles) page.forEach(uv, [&page](std::size_t i) { page.set(i); });
           break;
         }
       }

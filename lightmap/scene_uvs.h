@@ -25,7 +25,7 @@ bool receivesLight(const Scene& scene, const Instance& instance, const Primitive
 
 /// Measures TEXCOORD_1 of each receiving instance on a page of pageSize. Overlap is counted at 4 x 4 points per texel,
 /// each inside a triangle by the half-open rule, so that triangles that share an edge do not count; charts that only
-/// share a border texel (conservative coverage) do not either. Up to 0.1 % of the covered area, or four texels, is
+/// share a border texel (conservative coverage) do not either. Up to 0.1 % of the covered area, or sixteen texels, is
 /// taken as rounding of the artist's tool. Valid instances share a page as long as together they stay below the same
 /// limit; the first page on which an instance fits is taken, in the order of the scene.
 SceneUvs examineSceneUvs(const Scene& scene, const std::vector<int>& receivers, const AtlasOptions& options);

@@ -38,7 +38,7 @@ struct Page {
 };
 
 struct Chart {
-  int surface = 0;  // a chart belongs to one surface (one instance and primitive, one page)
+  int surface = 0;  // the first with a triangle of it; others may follow: of the same instance and page
   // May differ per chart where it was snapped or scaled per object.
   float texelsPerMeter = 0.0f;
 };

@@ -3,16 +3,12 @@
 #include <algorithm>
 
 #include "lightmap/chart_growing.h"
+#include "lightmap/chart_merging.h"
 #include "lightmap/flatten.h"
 #include "scene/parallel.h"
 
 namespace lumel {
 namespace {
-
-struct FlatChart {
-  ChartMesh mesh;
-  std::vector<Vec2d> uvs;
-};
 
 /// Triangles of `chart` by distance in steps from `seed`; -1 is not reached.
 std::vector<int> steps(const ChartMesh& chart, std::uint32_t seed, std::uint32_t& farthest) {
@@ -40,6 +36,34 @@ std::array<std::vector<std::uint32_t>, 2> halve(const ChartMesh& chart) {
   for (std::uint32_t t = 0; t < chart.triangles.size(); ++t)
     halves[fromOne[t] <= fromOther[t] ? 0 : 1].push_back(chart.meshTriangles[t]);
   return halves;
+}
+
+struct Box {
+  Vec2d low{std::numeric_limits<double>::infinity()};
+  Vec2d high{-std::numeric_limits<double>::infinity()};
+  double side() const { return std::max(high.x - low.x, high.y - low.y); }
+};
+
+Box boxOf(const std::vector<Vec2d>& uvs) {
+  Box box;
+  for (const Vec2d uv : uvs) {
+    box.low = glm::min(box.low, uv);
+    box.high = glm::max(box.high, uv);
+  }
+  return box;
+}
+
+/// Straightens a chart, unless that would make it too long for the page, and moves it to the origin.
+UnwrappedChart finish(const HalfEdgeMesh& mesh, FlatChart& flat, double largestSide) {
+  std::vector<Vec2d> aligned = flat.uvs;
+  alignToAxes(flat.mesh, aligned);
+  if (boxOf(aligned).side() > largestSide) aligned = std::move(flat.uvs);
+  const Vec2d low = boxOf(aligned).low;
+  UnwrappedChart chart;
+  for (const Vec2d uv : aligned) chart.uvs.push_back(Vec2(uv - low));
+  for (const std::uint32_t t : flat.mesh.meshTriangles) chart.triangles.push_back(mesh.sourceTriangle[t]);
+  chart.corners = std::move(flat.mesh.triangles);
+  return chart;
 }
 
 class Unwrapper {
@@ -110,23 +134,26 @@ Unwrapped unwrap(const TriangleSoup& soup, const UnwrapOptions& options) {
     for (std::size_t i = first; i < last; ++i) perRegion[i] = unwrapper.region(tree.roots[i]);
   });
 
+  std::vector<FlatChart> charts;
+  for (std::vector<FlatChart>& region : perRegion)
+    for (FlatChart& flat : region) charts.push_back(std::move(flat));
+  charts = mergeCharts(mesh, std::move(charts), {options.maxStretch, options.largestSide});
+
   Unwrapped result;
   result.degenerateTriangles = mesh.degenerateTriangles;
   result.nonManifoldEdges = mesh.nonManifoldEdges;
-  for (std::vector<FlatChart>& region : perRegion)
-    for (FlatChart& flat : region) {
-      UnwrappedChart chart;
-      chart.corners = std::move(flat.mesh.triangles);
-      Vec2d low(std::numeric_limits<double>::infinity()), high = -low;
-      for (const Vec2d uv : flat.uvs) {
-        low = glm::min(low, uv);
-        high = glm::max(high, uv);
-      }
-      result.tooLarge |= std::max(high.x - low.x, high.y - low.y) > options.largestSide;
-      for (const Vec2d uv : flat.uvs) chart.uvs.push_back(Vec2(uv - low));
-      for (const std::uint32_t t : flat.mesh.meshTriangles) chart.triangles.push_back(mesh.sourceTriangle[t]);
-      result.charts.push_back(std::move(chart));
+  result.charts.resize(charts.size());
+  std::vector<std::uint8_t> tooLarge(charts.size(), 0);
+  constexpr std::size_t kGrain = 64;
+  parallelFor(charts.size(), kGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      result.charts[i] = finish(mesh, charts[i], options.largestSide);
+      Vec2 high(0.0f);
+      for (const Vec2 uv : result.charts[i].uvs) high = glm::max(high, uv);
+      tooLarge[i] = static_cast<double>(std::max(high.x, high.y)) > options.largestSide * 1.000001;
     }
+  });
+  result.tooLarge = std::find(tooLarge.begin(), tooLarge.end(), 1) != tooLarge.end();
   std::stable_sort(result.charts.begin(), result.charts.end(), [](const UnwrappedChart& a, const UnwrappedChart& b) {
     return a.triangles.front() < b.triangles.front();
   });

@@ -134,22 +134,14 @@ std::optional<Error> checkRequiredExtensions(const Json& root, const std::string
   return std::nullopt;
 }
 
-bool isMeshoptFallback(const Json& buffer) {
-  for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression"}) {
-    const Json::json_pointer flag(std::string("/extensions/") + name + "/fallback");
-    if (buffer.contains(flag) && buffer.at(flag) == true) return true;
-  }
-  return false;
-}
-
 Expected<GltfBuffer> loadBuffer(const GltfDocument& document, const Json& json, std::size_t index,
                                 const std::optional<std::span<const std::uint8_t>>& bin) {
   const std::string place = "buffers/" + std::to_string(index);
   GltfBuffer buffer;
   const std::string uri = json.value("uri", "");
-  if (isMeshoptFallback(json)) return buffer;
   if (uri.empty()) {
-    if (index != 0 || !bin) return document.error(place, "has no uri and no GLB chunk; export or copy the file again");
+    // A buffer without bytes is an error only once something reads it: meshopt's fallback buffers are like that.
+    if (index != 0 || !bin) return buffer;
     buffer.bytes = *bin;
   } else if (isDataUri(uri)) {
     auto decoded = decodeDataUri(uri);
@@ -205,7 +197,9 @@ Expected<std::span<const std::uint8_t>> GltfDocument::viewBytes(int view) const 
   if (!decodedViews[index].empty()) return std::span<const std::uint8_t>(decodedViews[index]);
   const auto& v = model.bufferViews[index];
   const GltfBuffer& buffer = buffers[static_cast<std::size_t>(v.buffer)];
-  if (!buffer.present) return error(place, "buffers/" + std::to_string(v.buffer) + " has no bytes");
+  if (!buffer.present) 
+    return error(place, "buffers/" + std::to_string(v.buffer) +
+                            " has neither a uri nor a GLB chunk; export or copy the file again");
   if (v.byteOffset > buffer.bytes.size() || v.byteLength > buffer.bytes.size() - v.byteOffset)
     return error(place, std::to_string(v.byteLength) + " bytes from " + std::to_string(v.byteOffset) +
                             " on do not fit buffers/" + std::to_string(v.buffer) + ", which has " +

@@ -23,7 +23,7 @@ namespace lumel {
 struct GltfBuffer {
   std::vector<std::uint8_t> owned;
   std::span<const std::uint8_t> bytes;  // into `owned` or the container
-  bool present = false;                 // false: a meshopt fallback buffer, which has no bytes
+  bool present = false;                 // false: neither uri nor GLB chunk (fallback buffers of meshopt)
 };
 
 struct GltfImage {

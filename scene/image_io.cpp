@@ -134,7 +134,11 @@ Expected<ImageWriter> ImageWriter::open(const std::filesystem::path& file, int w
   OIIO::ImageSpec spec(width, height, channels, type);
   if (!options.channelNames.empty()) spec.channelnames = options.channelNames;
   spec.attribute("oiio:UnassociatedAlpha", 1);
-  if (std::string_view(state->output->format_name()) == "openexr") spec.attribute("compression", "zip");
+  if (std::string_view(state->output->format_name()) == "openexr") {
+    spec.attribute("compression", "zip");
+    // OpenImageIO adds the time of day where there is none, and equal images would be unequal files.
+    spec.attribute("DateTime", "");
+  }
   for (const auto& [key, value] : options.metadata) spec.attribute(key, value);
   state->file = file;
   state->temporary = file.parent_path() /

@@ -5,6 +5,7 @@
 
 #include "scene/file_access.h"
 #include "scene/gltf_loader.h"
+#include "scene/obj_loader.h"
 
 namespace lumel {
 
@@ -12,11 +13,15 @@ Expected<Scene> loadScene(const std::filesystem::path& file, const LoadOptions& 
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension != ".gltf" && extension != ".glb")
-    return inputError(file.string() + ": '" + extension + "' is not a scene type that can be read; use .gltf, .glb or .obj");
+  const bool isObj = extension == ".obj";
+  if (!isObj && extension != ".gltf" && extension != ".glb")
+    return inputError(file.string() + ": is not a scene file that can be read; use .gltf, .glb or .obj");
   auto bytes = readFile(file);
   if (!bytes) return bytes.error();
-  return loadGltf(*std::move(bytes), file.string(), file.parent_path(), options);
+  const auto folder = file.parent_path();
+  if (!isObj) return loadGltf(*std::move(bytes), file.string(), folder, options);
+  const std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  return loadObj(text, file.string(), folder, options);
 }
 
 }  // namespace lumel

@@ -4,6 +4,7 @@
 #define GLM_FORCE_XYZW_ONLY
 #include <cmath>
 #include <glm/glm.hpp>
+#include <glm/gtc/quaternion.hpp>
 #include <numbers>
 
 namespace lumel {

@@ -230,6 +230,17 @@ TEST(Pack, WholeTexelRectanglesWasteNothing) {
   for (const Placement& p : result.placements) EXPECT_EQ(p.page, 0);
 }
 
+TEST(Pack, TriesOtherOrdersBeforeGivingUp) {
+  // A bar, two squares of 36 side by side and three rectangles of 36 x 27: standing, the three fill the width of 85
+  // exactly. By size alone they lie down, two to a row, and the third finds no place.
+  std::vector<PackShape> shapes(2, rectangle(36, 36));
+  shapes.insert(shapes.end(), 3, rectangle(36, 27));
+  shapes.push_back(rectangle(72, 8));
+  const PackResult result = pack(shapes, {.pageSize = 87, .maxPages = 1, .padding = 2, .shrinkLast = false});
+  for (const Placement& p : result.placements) EXPECT_EQ(p.page, 0);
+  ownersByBruteForce(shapes, result);
+}
+
 TEST(Pack, GroupsStayTogether) {
   // Four squares of 30 fill a page of 64, in input order they come from four groups.
   std::vector<PackShape> shapes;

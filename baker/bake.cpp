@@ -1,0 +1,181 @@
+#include "baker/bake.h"
+
+#include <xmmintrin.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <limits>
+#include <span>
+
+#include "baker/path_integrator.h"
+#include "scene/parallel.h"
+
+namespace lumel {
+namespace {
+
+constexpr std::size_t kMostNotes = 10;
+
+/// Denormals are flushed while it lives: they are far below any light that a map can show and slow rays down.
+class FlushDenormals {
+ public:
+  FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040u); }  // FTZ | DAZ
+  ~FlushDenormals() { _mm_setcsr(saved_); }
+  FlushDenormals(const FlushDenormals&) = delete;
+  FlushDenormals& operator=(const FlushDenormals&) = delete;
+
+ private:
+  unsigned int saved_;
+};
+
+/// Up to kLanes consecutive texels of a page.
+struct Wave {
+  std::uint32_t page = 0;
+  std::size_t first = 0;
+  std::size_t count = 0;
+};
+
+std::vector<Wave> wavesOf(const std::vector<PageTexels>& texels) {
+  std::vector<Wave> waves;
+  for (std::size_t p = 0; p < texels.size(); ++p)
+    for (std::size_t first = 0; first < texels[p].size(); first += kLanes)
+      waves.push_back({static_cast<std::uint32_t>(p), first, std::min<std::size_t>(kLanes, texels[p].size() - first)});
+  return waves;
+}
+
+/// What a wave leaves beside its texels' pixels; summed in the order of waves.
+struct WaveStats {
+  std::uint64_t rays = 0;
+  std::uint64_t shadowRays = 0;
+  std::size_t nonFinite = 0;
+  std::vector<NonFiniteSample> firstNonFinite;
+  double luminance = 0.0;
+  double standardError = 0.0;
+  std::size_t validTexels = 0;
+  double residualSquares = 0.0;
+  std::size_t residuals = 0;
+};
+
+void storeTexel(BakedPage& page, TexelCoord at, const TexelResult& texel, Projection projection, WaveStats& stats) {
+  const SampleValue mean = texel.sums.mean();
+  const std::array<Vec3, 3> rnm = finishTexel(projection, mean.rnm, mean.flat);
+  for (std::size_t i = 0; i < 3; ++i) page.rnm[i].setRgb(at.x, at.y, rnm[i]);
+  page.flat.setRgb(at.x, at.y, mean.flat);
+  const float validity = texel.sums.validity();
+  const float standardError = texel.sums.standardError();
+  float* aux = page.aux.at(at.x, at.y);
+  aux[0] = texel.coverage;
+  aux[1] = validity;
+  aux[2] = standardError;
+  aux[3] = static_cast<float>(texel.sums.count());
+  if (validity < 0.5f) return;
+  ++stats.validTexels;
+  stats.luminance += static_cast<double>(luminance(mean.flat));
+  stats.standardError += static_cast<double>(standardError);
+  if (!texel.probed || texel.sums.count() == 0) return;
+  for (std::size_t i = 0; i < kProbeNormals; ++i) {
+    const Vec3 truth(texel.probes[i] / static_cast<double>(texel.sums.count()));
+    const auto difference = static_cast<double>(luminance(decodeRnm(rnm, probeNormals()[i])) - luminance(truth));
+    stats.residualSquares += difference * difference;
+    ++stats.residuals;
+  }
+}
+
+BakeStats sumUp(std::span<const WaveStats> waves, std::uint64_t seed) {
+  BakeStats total;
+  double luminanceSum = 0.0;
+  double errorSum = 0.0;
+  double residualSquares = 0.0;
+  std::size_t valid = 0;
+  std::size_t residuals = 0;
+  std::vector<std::string> notes;
+  for (const WaveStats& wave : waves) {
+    total.rays += wave.rays;
+    total.shadowRays += wave.shadowRays;
+    total.nonFiniteSamples += wave.nonFinite;
+    luminanceSum += wave.luminance;
+    errorSum += wave.standardError;
+    valid += wave.validTexels;
+    residualSquares += wave.residualSquares;
+    residuals += wave.residuals;
+    for (const NonFiniteSample& s : wave.firstNonFinite)
+      if (notes.size() < kMostNotes)
+        notes.push_back("non-finite sample left out: page " + std::to_string(s.page) + ", texel (" +
+                        std::to_string(s.texel.x) + ", " + std::to_string(s.texel.y) + "), sample " +
+                        std::to_string(s.sample) + ", seed " + std::to_string(seed));
+  }
+  total.notes = std::move(notes);
+  if (valid > 0) {
+    total.meanFlat = luminanceSum / static_cast<double>(valid);
+    total.meanStandardError = errorSum / static_cast<double>(valid);
+  }
+  if (residuals > 0 && total.meanFlat > 0)
+    total.projectionResidual = std::sqrt(residualSquares / static_cast<double>(residuals)) / total.meanFlat;
+  return total;
+}
+
+std::vector<BakedPage> emptyPages(const Atlas& atlas) {
+  std::vector<BakedPage> pages;
+  for (const Page& page : atlas.pages) {
+    const Image rgb(page.width, page.height, 3);
+    pages.push_back({{rgb, rgb, rgb}, rgb, Image(page.width, page.height, 4)});
+  }
+  return pages;
+}
+
+}  // namespace
+
+Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                          const BakeOptions& options, Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<std::string> notes;
+  const Materials materials(scene, options.bounces > 0, notes);
+  auto rays = RayScene::build(scene, materials);
+  if (!rays) return rays.error();
+  const float extent = glm::length((*rays)->boundsMax() - (*rays)->boundsMin());
+  const PunctualLights punctual(scene.lights, extent);
+  const EmissiveTriangles emissive(**rays, materials);
+  const EnvironmentLight environment(scene.environment);
+  const LightTransport transport{**rays, materials, punctual, emissive, environment};
+  const RnmKernels kernels(options.projection);
+  const PathIntegrator integrator(
+      transport, kernels, atlas,
+      {.samples = std::max(1, options.samples), .bounces = std::max(0, options.bounces), .seed = options.seed});
+
+  BakeResult result;
+  result.pages = emptyPages(atlas);
+  const std::vector<Wave> waves = wavesOf(texels);
+  std::vector<WaveStats> waveStats(waves.size());
+  std::uint64_t texelCount = 0;
+  for (const PageTexels& page : texels) texelCount += page.size();
+  progress.begin("bake", texelCount);
+  parallelFor(waves.size(), 1, [&](std::size_t first, std::size_t last) {
+    const FlushDenormals flush;
+    for (std::size_t w = first; w < last; ++w) {
+      if (progress.cancelled()) return;
+      const Wave& wave = waves[w];
+      const PageTexels& page = texels[wave.page];
+      WaveResult done = integrator.bakeWave(wave.page, page, wave.first, wave.count);
+      WaveStats& stats = waveStats[w];
+      stats.rays = done.rays;
+      stats.shadowRays = done.shadowRays;
+      stats.nonFinite = done.nonFinite.size();
+      done.nonFinite.resize(std::min(done.nonFinite.size(), kMostNotes));
+      stats.firstNonFinite = std::move(done.nonFinite);
+      for (std::size_t i = 0; i < wave.count; ++i)
+        if (done.texels[i].coverage > 0.0f)
+          storeTexel(result.pages[wave.page], page.coords[wave.first + i], done.texels[i], options.projection, stats);
+      progress.advance(wave.count);
+    }
+  });
+  progress.end();
+  if (progress.cancelled()) return interrupted();
+
+  result.stats = sumUp(waveStats, options.seed);
+  result.stats.texels = texelCount;
+  result.stats.notes.insert(result.stats.notes.begin(), notes.begin(), notes.end());
+  result.stats.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+}  // namespace lumel

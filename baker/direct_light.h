@@ -1,0 +1,80 @@
+// Next-event estimation for a wave of surface points: one shadow ray per point and kind of light that the scene has.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+
+#include "baker/light_transport.h"
+#include "baker/sampling.h"
+#include "baker/sobol.h"
+
+namespace lumel {
+
+/// A point that receives light; both normals on the side that light is gathered on.
+struct Receiver {
+  Vec3 p{0};
+  Vec3 ng{0, 0, 1};
+  Vec3 ns{0, 0, 1};
+  Vec3 rayStart{0};
+
+  bool sees(const Vec3& dirWorld) const { return glm::dot(dirWorld, ns) > 0.0f && glm::dot(dirWorld, ng) > 0.0f; }
+};
+
+/// The sample patterns that one receiver's decisions use, counted from a base.
+enum LightPattern : std::uint32_t { kPunctual, kEmitter, kEmitterPoint, kSky, kLightPatterns };
+
+/// One lane of a wave that wants light: `active` lanes are asked for.
+struct LightLanes {
+  std::array<bool, kLanes> active{};
+  std::array<Receiver, kLanes> receivers;
+  std::array<TexelSampler, kLanes> samplers;
+};
+
+/// Samples the lights for every active lane and calls add(lane, wi, radianceOverPdf) for each that is visible.
+/// `surfacePdf(cosTheta)` is the density with which the receiver gathers from a direction, for multiple importance
+/// sampling against hits. Returns the number of shadow rays.
+template <class SurfacePdf, class Add>
+std::uint64_t directLight(const LightTransport& transport, const LightLanes& lanes, std::uint32_t sample,
+                          std::uint32_t patternBase, TraceMode mode, SurfacePdf surfacePdf, Add add) {
+  std::uint64_t shadowRays = 0;
+  const auto estimate = [&](auto takeSample) {
+    ShadowPacket shadows;
+    std::array<Vec3, kLanes> light;
+    std::array<Vec3, kLanes> wi;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const auto l = static_cast<std::size_t>(lane);
+      if (!lanes.active[l]) continue;
+      const Receiver& receiver = lanes.receivers[l];
+      const LightSample s = takeSample(receiver, lanes.samplers[l]);
+      if (s.weight == Vec3(0.0f) || !receiver.sees(s.wi)) continue;
+      wi[l] = s.wi;
+      light[l] = s.weight;
+      if (s.pdf > 0.0f) light[l] *= misWeight(s.pdf, surfacePdf(glm::dot(s.wi, receiver.ns)));
+      if (s.distant)
+        shadows.set(lane, receiver.rayStart, s.wi, std::numeric_limits<float>::infinity());
+      else
+        shadows.set(lane, receiver.rayStart, s.target - receiver.rayStart, 1.0f);
+      ++shadowRays;
+    }
+    transport.rays.occluded(shadows, mode);
+    for (int lane = 0; lane < kLanes; ++lane)
+      if (shadows.visible(lane)) add(lane, wi[static_cast<std::size_t>(lane)], light[static_cast<std::size_t>(lane)]);
+  };
+  if (!transport.punctual.empty())
+    estimate([&](const Receiver& r, const TexelSampler& sampler) {
+      return transport.punctual.sample(r.p, r.ns, sampler.get1D(sample, patternBase + kPunctual));
+    });
+  if (!transport.emissive.empty())
+    estimate([&](const Receiver& r, const TexelSampler& sampler) {
+      return transport.emissive.sample(r.p, sampler.get1D(sample, patternBase + kEmitter),
+                                       sampler.get2D(sample, patternBase + kEmitterPoint));
+    });
+  if (transport.environment.sampled())
+    estimate([&](const Receiver&, const TexelSampler& sampler) {
+      return transport.environment.sample(sampler.get2D(sample, patternBase + kSky));
+    });
+  return shadowRays;
+}
+
+}  // namespace lumel

@@ -1,0 +1,59 @@
+// What light transport needs of materials: albedo, emission and alpha at a point of a triangle. Textures are decoded
+// only where they shade, emit or cut out.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "scene/scene.h"
+#include "scene/texture.h"
+
+namespace lumel {
+
+/// A point of a primitive: weights of the triangle's vertices 1 and 2.
+struct TrianglePoint {
+  const Primitive* primitive = nullptr;
+  std::uint32_t triangle = 0;
+  Vec2 barycentric{0, 0};
+};
+
+class Materials {
+ public:
+  /// Decodes the textures of the materials that casting instances use. `bounces` false: nothing is shaded, base
+  /// colour maps are needed for alpha alone. A texture that cannot be decoded leaves its factor alone; `notes` then
+  /// gains a line.
+  Materials(const Scene& scene, bool bounces, std::vector<std::string>& notes);
+
+  const Material& material(int index) const { return scene_->materials[static_cast<std::size_t>(index)]; }
+
+  /// Share of light reflected, 0..1: base colour times texture times vertex colour.
+  Vec3 albedo(const TrianglePoint& point) const;
+  /// Radiance sent out from the front (and from the back where doubleSided): nits. Alpha is not applied.
+  Vec3 emission(const TrianglePoint& point) const;
+  /// 0..1: for MASK 0 or 1 (the cut-off applied), for BLEND the share of light that is held.
+  float opacity(const TrianglePoint& point) const;
+
+  /// An unlit material shows its base colour, which is not light: it emits nothing.
+  bool emits(int index) const { return material(index).emission != Vec3(0.0f) && !material(index).unlit; }
+  /// Whether opacity varies over the primitive or is partial, so that rays must ask for it.
+  bool needsAlphaTest(const Primitive& primitive) const;
+  /// Whether no ray can ever hit the primitive.
+  bool invisible(const Primitive& primitive) const;
+
+  std::size_t decodedTextures() const { return decodedTextures_; }
+
+ private:
+  const Texture* colorTexture(int material) const;
+  float alpha(const TrianglePoint& point) const;
+
+  const Scene* scene_;
+  std::vector<std::optional<Texture>> srgbByImage_;  // per Scene::images
+  std::size_t decodedTextures_ = 0;
+};
+
+/// Interpolated texture coordinates; (0, 0) where the primitive lacks the set.
+Vec2 uvAt(const TrianglePoint& point, int uvSet);
+
+}  // namespace lumel

@@ -1,0 +1,275 @@
+#include "baker/path_integrator.h"
+
+#include <algorithm>
+
+#include "baker/direct_light.h"
+#include "baker/sampling.h"
+
+namespace lumel {
+namespace {
+
+/// Bounces after which paths may end by Russian roulette.
+constexpr int kRouletteAfter = 4;
+
+/// Sample patterns of a texel: the first receiver's, then a block for every hit.
+constexpr std::uint32_t kFootprint = kLightPatterns;
+constexpr std::uint32_t kDirection = kLightPatterns + 1;
+constexpr std::uint32_t kRoulette = kLightPatterns + 2;
+constexpr std::uint32_t kPatternsPerReceiver = kLightPatterns + 4;
+
+/// The state of one sample's path in one lane.
+struct Path {
+  Frame frame;            // of the texel's point
+  Vec3 gatherTangent{0};  // direction of the gather ray
+  float gatherPdf = 0.0f;
+  Vec3 beta{0};      // throughput from the gather ray's start
+  Vec3 radiance{0};  // what the gather ray has brought back so far
+  Vec3 origin{0};    // of the ray in flight: the surface point, before its offset
+  float pdf = 0.0f;  // density of the ray in flight's direction
+  SampleValue value;
+  std::array<Vec3, kProbeNormals> probes{};
+};
+
+class WaveTracer {
+ public:
+  WaveTracer(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas, const PathOptions& options)
+      : transport_(transport), kernels_(kernels), atlas_(atlas), options_(options) {
+    lastDepth_ = transport.dark() ? 0 : options.bounces;
+  }
+
+  WaveResult run(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count);
+
+ private:
+  void startTexels(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count);
+  void startSample(std::uint32_t sample);
+  void lightTexels(std::uint32_t sample);
+  void followPaths(std::uint32_t sample);
+  bool shadeHit(int lane, int depth, std::uint32_t sample);
+  bool scatter(int lane, int depth, std::uint32_t sample);
+  void launch(int lane, const Receiver& receiver, const Vec3& dirWorld, float pdf);
+  void addLight(int lane, const Vec3& dirTangent, const Vec3& radianceOverPdf);
+  void finishSample(std::uint32_t sample);
+  Vec3 rayStart(const SurfacePoint& point) const;
+
+  const LightTransport& transport_;
+  const RnmKernels& kernels_;
+  const Atlas& atlas_;
+  const PathOptions& options_;
+  int lastDepth_ = 0;
+
+  std::uint32_t page_ = 0;
+  std::array<TexelCoord, kLanes> coords_;
+  std::array<TexelFootprint, kLanes> footprints_;
+  std::array<bool, kLanes> covered_{};
+  LightLanes lanes_;  // receivers of the light that is sampled next
+  std::array<Path, kLanes> paths_;
+  RayPacket rays_;
+  WaveResult result_;
+};
+
+WaveResult WaveTracer::run(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count) {
+  startTexels(pageIndex, page, first, count);
+  for (std::uint32_t sample = 0; sample < static_cast<std::uint32_t>(options_.samples); ++sample) {
+    startSample(sample);
+    lightTexels(sample);
+    followPaths(sample);
+    finishSample(sample);
+  }
+  return std::move(result_);
+}
+
+void WaveTracer::startTexels(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count) {
+  page_ = pageIndex;
+  for (std::size_t lane = 0; lane < count; ++lane) {
+    coords_[lane] = page.coords[first + lane];
+    const double area = footprints_[lane].clip(atlas_, page, first + lane);
+    TexelResult& texel = result_.texels[lane];
+    texel.coverage = static_cast<float>(std::min(area, 1.0));
+    texel.probed = (first + lane) % PathIntegrator::kProbeStride == 0;
+    covered_[lane] = area > 0.0;
+    lanes_.samplers[lane] = TexelSampler(options_.seed, pageIndex, coords_[lane].x, coords_[lane].y);
+  }
+}
+
+Vec3 WaveTracer::rayStart(const SurfacePoint& point) const {
+  const Surface& surface = atlas_.surfaces[point.triangle.surface];
+  const std::uint32_t* corner = surface.indices.data() + std::size_t{3} * point.triangle.triangle;
+  const Vec3 corners[3] = {surface.positions[corner[0]], surface.positions[corner[1]], surface.positions[corner[2]]};
+  return offsetPoint(point.position, point.geometricNormal, corners, transport_.rays.translationOf(surface.instance));
+}
+
+void WaveTracer::startSample(std::uint32_t sample) {
+  rays_.clear();
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    lanes_.active[lane] = covered_[lane];
+    if (!covered_[lane]) continue;
+    const TexelSampler& sampler = lanes_.samplers[lane];
+    const SurfacePoint point = footprints_[lane].sample(sampler.get2D(sample, kFootprint));
+    Path& path = paths_[lane];
+    path = Path{};
+    path.frame = point.frame;
+    Receiver& receiver = lanes_.receivers[lane];
+    receiver = {point.position, point.geometricNormal, point.frame.n, rayStart(point)};
+    path.gatherTangent = sampleGatherHemisphere(sampler.get2D(sample, kDirection));
+    path.gatherPdf = gatherHemispherePdf(path.gatherTangent.z);
+    const Vec3 dirWorld = path.frame.fromLocal(path.gatherTangent);
+    // A bent shading normal gathers from below the surface too, where nothing arrives.
+    if (glm::dot(dirWorld, receiver.ng) > 0.0f) launch(static_cast<int>(lane), receiver, dirWorld, path.gatherPdf);
+    path.beta = Vec3(1.0f);
+  }
+}
+
+void WaveTracer::launch(int lane, const Receiver& receiver, const Vec3& dirWorld, float pdf) {
+  Path& path = paths_[static_cast<std::size_t>(lane)];
+  path.origin = receiver.p;
+  path.pdf = pdf;
+  rays_.set(lane, receiver.rayStart, dirWorld);
+  ++result_.rays;
+}
+
+void WaveTracer::addLight(int lane, const Vec3& dirTangent, const Vec3& radianceOverPdf) {
+  const auto l = static_cast<std::size_t>(lane);
+  Path& path = paths_[l];
+  const Vec3 light = radianceOverPdf * kInvPi;
+  const Vec3 kernels = kernels_(dirTangent);
+  path.value.flat += light * std::max(0.0f, dirTangent.z);
+  for (int i = 0; i < 3; ++i) path.value.rnm[static_cast<std::size_t>(i)] += light * kernels[i];
+  if (result_.texels[l].probed)
+    for (std::size_t i = 0; i < kProbeNormals; ++i)
+      path.probes[i] += light * std::max(0.0f, glm::dot(dirTangent, probeNormals()[i]));
+}
+
+void WaveTracer::lightTexels(std::uint32_t sample) {
+  result_.shadowRays += directLight(
+      transport_, lanes_, sample, 0, options_.gatherMode, [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
+      [&](int lane, const Vec3& wi, const Vec3& light) {
+        addLight(lane, paths_[static_cast<std::size_t>(lane)].frame.toLocal(wi), light);
+      });
+}
+
+void WaveTracer::followPaths(std::uint32_t sample) {
+  for (int depth = 0;; ++depth) {
+    transport_.rays.intersect(rays_, depth == 0 ? options_.gatherMode : options_.bounceMode);
+    bool any = false;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const auto l = static_cast<std::size_t>(lane);
+      lanes_.active[l] = rays_.valid[lane] != 0 && shadeHit(lane, depth, sample);
+      any |= lanes_.active[l];
+    }
+    if (!any) break;
+    const std::uint32_t pattern = static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver;
+    result_.shadowRays += directLight(
+        transport_, lanes_, sample, pattern, options_.bounceMode,
+        [](float cosTheta) { return cosineHemispherePdf(cosTheta); },
+        [&](int lane, const Vec3& wi, const Vec3& light) {
+          Path& path = paths_[static_cast<std::size_t>(lane)];
+          const float cosTheta = glm::dot(wi, lanes_.receivers[static_cast<std::size_t>(lane)].ns);
+          path.radiance += path.beta * light * (cosTheta * kInvPi);
+        });
+    // The last ray of a path only looks for what shines by itself.
+    if (depth + 1 == lastDepth_ && !transport_.raysSeeLight()) break;
+    rays_.clear();
+    bool alive = false;
+    for (int lane = 0; lane < kLanes; ++lane)
+      if (lanes_.active[static_cast<std::size_t>(lane)]) alive |= scatter(lane, depth, sample);
+    if (!alive) break;
+  }
+}
+
+/// What the ray in flight found: adds what shines by itself. Returns whether the path goes on from there; then
+/// lanes_.receivers holds the point and beta its albedo.
+bool WaveTracer::shadeHit(int lane, int depth, std::uint32_t sample) {
+  const auto l = static_cast<std::size_t>(lane);
+  Path& path = paths_[l];
+  if (!rays_.hit(lane)) {
+    if (depth == 0) result_.texels[l].sums.countGatherRay(false);
+    if (!transport_.environment.shines()) return false;
+    const RTCRay16& ray = rays_.rayhit.ray;
+    const Vec3 dir(ray.dir_x[lane], ray.dir_y[lane], ray.dir_z[lane]);
+    path.radiance +=
+        path.beta * transport_.environment.radiance(dir) * misWeight(path.pdf, transport_.environment.pdf(dir));
+    return false;
+  }
+  const HitSurface hit = transport_.rays.surfaceAt(rays_, lane);
+  if (depth == 0)
+    result_.texels[l].sums.countGatherRay(hit.backFace && !transport_.materials.material(hit.material).doubleSided);
+  const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
+  if (emitted != Vec3(0.0f))
+    path.radiance += path.beta * emitted * misWeight(path.pdf, transport_.emissive.pdf(hit, path.origin));
+  if (depth == lastDepth_) return false;
+  path.beta *= transport_.materials.albedo(hit.point);
+  const float most = std::max({path.beta.x, path.beta.y, path.beta.z});
+  if (most == 0.0f) return false;
+  if (depth >= kRouletteAfter) {
+    const float survival = std::clamp(most, 0.05f, 1.0f);
+    const std::uint32_t pattern = static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver + kRoulette;
+    if (lanes_.samplers[l].get1D(sample, pattern) >= survival) return false;
+    path.beta /= survival;
+  }
+  lanes_.receivers[l] = {hit.p, hit.ng, hit.ns, hit.rayStart};
+  return true;
+}
+
+/// Sends the path on by the cosine; returns false where the direction falls below the surface.
+bool WaveTracer::scatter(int lane, int depth, std::uint32_t sample) {
+  const auto l = static_cast<std::size_t>(lane);
+  const Receiver& receiver = lanes_.receivers[l];
+  const std::uint32_t pattern = static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver + kDirection;
+  const Vec3 local = sampleCosineHemisphere(lanes_.samplers[l].get2D(sample, pattern));
+  const Vec3 dirWorld = frameAround(receiver.ns).fromLocal(local);
+  if (!(glm::dot(dirWorld, receiver.ng) > 0.0f)) return false;
+  launch(lane, receiver, dirWorld, cosineHemispherePdf(local.z));
+  return true;
+}
+
+bool allFinite(const SampleValue& value) {
+  return isFinite(value.flat) && isFinite(value.rnm[0]) && isFinite(value.rnm[1]) && isFinite(value.rnm[2]);
+}
+
+void WaveTracer::finishSample(std::uint32_t sample) {
+  const auto batch =
+      static_cast<int>(std::uint64_t{sample} * TexelSums::kBatches / static_cast<std::uint64_t>(options_.samples));
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!covered_[lane]) continue;
+    Path& path = paths_[lane];
+    if (path.radiance != Vec3(0.0f))
+      addLight(static_cast<int>(lane), path.gatherTangent, path.radiance / path.gatherPdf);
+    if (!allFinite(path.value)) {
+      result_.nonFinite.push_back({page_, coords_[lane], sample});
+      continue;
+    }
+    TexelResult& texel = result_.texels[lane];
+    texel.sums.add(path.value, batch);
+    if (texel.probed)
+      for (std::size_t i = 0; i < kProbeNormals; ++i) texel.probes[i] += path.probes[i];
+  }
+}
+
+}  // namespace
+
+const std::array<Vec3, kProbeNormals>& probeNormals() {
+  static const std::array<Vec3, kProbeNormals> normals = [] {
+    std::array<Vec3, kProbeNormals> n;
+    n[0] = {0, 0, 1};
+    for (int i = 0; i < 6; ++i) {
+      const float tilt = (i % 2 == 0 ? 15.0f : 30.0f) * kPi / 180.0f;
+      const float azimuth = static_cast<float>(i) * kPi / 3.0f;
+      n[static_cast<std::size_t>(i) + 1] = {std::sin(tilt) * std::cos(azimuth), std::sin(tilt) * std::sin(azimuth),
+                                            std::cos(tilt)};
+    }
+    return n;
+  }();
+  return normals;
+}
+
+PathIntegrator::PathIntegrator(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
+                               const PathOptions& options)
+    : transport_(transport), kernels_(kernels), atlas_(atlas), options_(options) {}
+
+WaveResult PathIntegrator::bakeWave(std::uint32_t pageIndex, const PageTexels& page, std::size_t first,
+                                    std::size_t count) const {
+  WaveTracer tracer(transport_, kernels_, atlas_, options_);
+  return tracer.run(pageIndex, page, first, count);
+}
+
+}  // namespace lumel

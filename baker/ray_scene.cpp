@@ -1,0 +1,308 @@
+#include "baker/ray_scene.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+
+#include "baker/sobol.h"
+#include "scene/check.h"
+
+namespace lumel {
+namespace {
+
+float maxAbs(const Vec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
+
+/// Cofactor matrix: maps cross products of object-space edges to those of world-space edges.
+Mat3 cofactors(const Mat4& m) {
+  const Vec3 x(m[0]), y(m[1]), z(m[2]);
+  return {glm::cross(y, z), glm::cross(z, x), glm::cross(x, y)};
+}
+
+template <class T>
+T* embreeBuffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::size_t count) {
+  return static_cast<T*>(rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(T), count));
+}
+
+RTCIntersectContext contextFor(TraceMode mode) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags =
+      mode == TraceMode::Coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  return context;
+}
+
+/// A number in [0, 1) from a ray's bits and the triangle: the same for every thread and every order of work.
+float rayHash(RTCRayN* ray, unsigned int rays, unsigned int lane, std::uint32_t geometry, std::uint32_t triangle) {
+  std::uint32_t h = hashCombine(geometry, triangle);
+  for (const float f : {RTCRayN_org_x(ray, rays, lane), RTCRayN_org_y(ray, rays, lane), RTCRayN_org_z(ray, rays, lane),
+                        RTCRayN_dir_x(ray, rays, lane), RTCRayN_dir_y(ray, rays, lane), RTCRayN_dir_z(ray, rays, lane)})
+    h = hashCombine(h, std::bit_cast<std::uint32_t>(f));
+  return unitFloat(h);
+}
+
+}  // namespace
+
+Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const Vec3 corners[3], const Vec3& translation) {
+  const float largest = std::max({maxAbs(corners[0]), maxAbs(corners[1]), maxAbs(corners[2])}) + maxAbs(translation);
+  const float distance = 8.0f * std::numeric_limits<float>::epsilon() * largest;
+  const Vec3 inwards = (corners[0] - p) + (corners[1] - p) + (corners[2] - p);
+  const float reach = glm::length(inwards);
+  // At most half the way to the centroid, which lies at inwards / 3.
+  const float share = reach > 6.0f * distance ? distance / reach : 1.0f / 6.0f;
+  return p + (ng * distance + inwards * share);
+}
+
+void RayPacket::clear() { std::fill(std::begin(valid), std::end(valid), 0); }
+
+void RayPacket::set(int lane, const Vec3& origin, const Vec3& dir) {
+  RTCRay16& ray = rayhit.ray;
+  ray.org_x[lane] = origin.x;
+  ray.org_y[lane] = origin.y;
+  ray.org_z[lane] = origin.z;
+  ray.dir_x[lane] = dir.x;
+  ray.dir_y[lane] = dir.y;
+  ray.dir_z[lane] = dir.z;
+  ray.tnear[lane] = 0.0f;
+  ray.tfar[lane] = std::numeric_limits<float>::infinity();
+  ray.time[lane] = 0.0f;
+  ray.mask[lane] = 0xffffffffu;
+  ray.id[lane] = 0;
+  ray.flags[lane] = 0;
+  rayhit.hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
+  rayhit.hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
+  valid[lane] = -1;
+}
+
+void ShadowPacket::clear() {
+  std::fill(std::begin(valid), std::end(valid), 0);
+  any = false;
+}
+
+void ShadowPacket::set(int lane, const Vec3& origin, const Vec3& dir, float length) {
+  ray.org_x[lane] = origin.x;
+  ray.org_y[lane] = origin.y;
+  ray.org_z[lane] = origin.z;
+  ray.dir_x[lane] = dir.x;
+  ray.dir_y[lane] = dir.y;
+  ray.dir_z[lane] = dir.z;
+  ray.tnear[lane] = 0.0f;
+  ray.tfar[lane] = length;
+  ray.time[lane] = 0.0f;
+  ray.mask[lane] = 0xffffffffu;
+  ray.id[lane] = 0;
+  ray.flags[lane] = 0;
+  valid[lane] = -1;
+  any = true;
+}
+
+Expected<std::unique_ptr<RayScene>> RayScene::build(const Scene& scene, const Materials& materials) {
+  std::unique_ptr<RayScene> rays(new RayScene(scene, materials));
+  if (auto built = rays->buildGeometry(); !built) return built.error();
+  return rays;
+}
+
+Expected<void> RayScene::buildGeometry() {
+  auto device = newEmbreeDevice();
+  if (!device) return device.error();
+  device_ = *std::move(device);
+  top_ = newEmbreeScene(device_.get());
+  meshScenes_.resize(scene_->meshes.size());
+
+  std::vector<int> uses(scene_->meshes.size(), 0);
+  for (const Instance& instance : scene_->instances)
+    if (instance.settings.casts) ++uses[static_cast<std::size_t>(instance.mesh)];
+
+  for (std::size_t i = 0; i < scene_->instances.size(); ++i) {
+    const Instance& instance = scene_->instances[i];
+    if (!instance.settings.casts) continue;
+    const std::uint32_t firstPart = addParts(static_cast<int>(i));
+    if (firstPart == parts_.size()) continue;
+    if (uses[static_cast<std::size_t>(instance.mesh)] == 1) {
+      for (std::uint32_t p = firstPart; p < parts_.size(); ++p) {
+        auto geometry = triangles(*parts_[p].primitive, &instance.worldFromObject, &parts_[p].worldPositions);
+        if (!geometry) return failure("ray tracing: out of memory for the triangles of '" + instance.name + "'");
+        rtcAttachGeometry(top_.get(), geometry.get());
+        partOfGeometry_.push_back(p);
+      }
+      continue;
+    }
+    const auto shared = meshScene(instance.mesh);
+    if (!shared) return shared.error();
+    EmbreeGeometry placed(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
+    rtcSetGeometryInstancedScene(placed.get(), *shared);
+    rtcSetGeometryTransform(placed.get(), 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, &instance.worldFromObject);
+    rtcCommitGeometry(placed.get());
+    rtcAttachGeometry(top_.get(), placed.get());
+    partOfGeometry_.push_back(firstPart);
+  }
+  if (auto committed = commitScene(device_.get(), top_.get(), "building the ray tracing structure"); !committed)
+    return committed.error();
+  if (!parts_.empty()) {
+    RTCBounds bounds;
+    rtcGetSceneBounds(top_.get(), &bounds);
+    boundsMin_ = {bounds.lower_x, bounds.lower_y, bounds.lower_z};
+    boundsMax_ = {bounds.upper_x, bounds.upper_y, bounds.upper_z};
+  }
+  return {};
+}
+
+std::uint32_t RayScene::addParts(int instanceIndex) {
+  const Instance& instance = scene_->instances[static_cast<std::size_t>(instanceIndex)];
+  const auto first = static_cast<std::uint32_t>(parts_.size());
+  for (const Primitive& primitive : scene_->meshes[static_cast<std::size_t>(instance.mesh)].primitives) {
+    if (materials_->invisible(primitive)) continue;
+    ScenePart part;
+    part.primitive = &primitive;
+    part.instance = instanceIndex;
+    part.worldFromObject = instance.worldFromObject;
+    part.frontSign = glm::determinant(Mat3(instance.worldFromObject)) < 0 ? -1.0f : 1.0f;
+    part.worldFromNormal = cofactors(instance.worldFromObject) * part.frontSign;
+    parts_.push_back(std::move(part));
+  }
+  return first;
+}
+
+EmbreeGeometry RayScene::triangles(const Primitive& primitive, const Mat4* worldFromObject, const Vec3** vertices) {
+  EmbreeGeometry geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+  auto* positions =
+      embreeBuffer<Vec3>(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, primitive.positions.size());
+  auto* indices = embreeBuffer<std::array<std::uint32_t, 3>>(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3,
+                                                             primitive.triangleCount());
+  if (!positions || !indices) return nullptr;
+  for (std::size_t i = 0; i < primitive.positions.size(); ++i)
+    positions[i] =
+        worldFromObject ? Vec3(*worldFromObject * Vec4(primitive.positions[i], 1.0f)) : primitive.positions[i];
+  for (std::size_t i = 0; i < primitive.triangleCount(); ++i)
+    indices[i] = {primitive.indices[3 * i], primitive.indices[3 * i + 1], primitive.indices[3 * i + 2]};
+  if (vertices) *vertices = positions;
+  if (materials_->needsAlphaTest(primitive)) {
+    alphaTested_.push_back(std::make_unique<AlphaTested>(AlphaTested{materials_, &primitive}));
+    rtcSetGeometryUserData(geometry.get(), alphaTested_.back().get());
+    rtcSetGeometryIntersectFilterFunction(geometry.get(), &RayScene::alphaFilter);
+    rtcSetGeometryOccludedFilterFunction(geometry.get(), &RayScene::alphaFilter);
+  }
+  rtcCommitGeometry(geometry.get());
+  return geometry;
+}
+
+Expected<RTCScene> RayScene::meshScene(int mesh) {
+  EmbreeScene& shared = meshScenes_[static_cast<std::size_t>(mesh)];
+  if (shared) return shared.get();
+  shared = newEmbreeScene(device_.get());
+  const Mesh& source = scene_->meshes[static_cast<std::size_t>(mesh)];
+  for (const Primitive& primitive : source.primitives) {
+    if (materials_->invisible(primitive)) continue;
+    auto geometry = triangles(primitive, nullptr, nullptr);
+    if (!geometry) return failure("ray tracing: out of memory for the triangles of mesh '" + source.name + "'");
+    rtcAttachGeometry(shared.get(), geometry.get());
+  }
+  if (auto committed = commitScene(device_.get(), shared.get(), "mesh '" + source.name + "'"); !committed)
+    return committed.error();
+  return shared.get();
+}
+
+void RayScene::alphaFilter(const RTCFilterFunctionNArguments* args) {
+  const auto& tested = *static_cast<const AlphaTested*>(args->geometryUserPtr);
+  for (unsigned int lane = 0; lane < args->N; ++lane) {
+    if (args->valid[lane] != -1) continue;
+    const std::uint32_t triangle = RTCHitN_primID(args->hit, args->N, lane);
+    const float opacity = tested.materials->opacity(
+        {tested.primitive, triangle, {RTCHitN_u(args->hit, args->N, lane), RTCHitN_v(args->hit, args->N, lane)}});
+    if (opacity >= 1.0f) continue;
+    const std::uint32_t geometry = RTCHitN_geomID(args->hit, args->N, lane);
+    if (opacity <= 0.0f || rayHash(args->ray, args->N, lane, geometry, triangle) >= opacity) args->valid[lane] = 0;
+  }
+}
+
+void RayScene::intersect(RayPacket& rays, TraceMode mode) const {
+  RTCIntersectContext context = contextFor(mode);
+  if (mode != TraceMode::Single) {
+    rtcIntersect16(rays.valid, top_.get(), &context, &rays.rayhit);
+    return;
+  }
+  for (int lane = 0; lane < kLanes; ++lane) {
+    if (!rays.valid[lane]) continue;
+    RTCRayHit one;
+    one.ray = rtcGetRayFromRayN(reinterpret_cast<RTCRayN*>(&rays.rayhit.ray), kLanes, static_cast<unsigned>(lane));
+    one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    one.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(top_.get(), &context, &one);
+    rays.rayhit.ray.tfar[lane] = one.ray.tfar;
+    rays.rayhit.hit.u[lane] = one.hit.u;
+    rays.rayhit.hit.v[lane] = one.hit.v;
+    rays.rayhit.hit.primID[lane] = one.hit.primID;
+    rays.rayhit.hit.geomID[lane] = one.hit.geomID;
+    rays.rayhit.hit.instID[0][lane] = one.hit.instID[0];
+  }
+}
+
+void RayScene::occluded(ShadowPacket& rays, TraceMode mode) const {
+  if (!rays.any) return;
+  RTCIntersectContext context = contextFor(mode);
+  if (mode != TraceMode::Single) {
+    rtcOccluded16(rays.valid, top_.get(), &context, &rays.ray);
+    return;
+  }
+  for (int lane = 0; lane < kLanes; ++lane) {
+    if (!rays.valid[lane]) continue;
+    RTCRay one = rtcGetRayFromRayN(reinterpret_cast<RTCRayN*>(&rays.ray), kLanes, static_cast<unsigned>(lane));
+    rtcOccluded1(top_.get(), &context, &one);
+    rays.ray.tfar[lane] = one.tfar;
+  }
+}
+
+std::uint32_t RayScene::partOf(const RayPacket& rays, int lane) const {
+  const RTCHit16& hit = rays.rayhit.hit;
+  const std::uint32_t instance = hit.instID[0][lane];
+  if (instance == RTC_INVALID_GEOMETRY_ID) return partOfGeometry_[hit.geomID[lane]];
+  return partOfGeometry_[instance] + hit.geomID[lane];
+}
+
+Vec3 RayScene::translationOf(int instance) const {
+  const Instance& placed = scene_->instances[static_cast<std::size_t>(instance)];
+  const bool byEmbree = placed.settings.casts && meshScenes_[static_cast<std::size_t>(placed.mesh)];
+  return byEmbree ? Vec3(placed.worldFromObject[3]) : Vec3(0.0f);
+}
+
+void RayScene::corners(const ScenePart& part, std::uint32_t triangle, Vec3 out[3]) const {
+  const std::uint32_t* corner = part.primitive->indices.data() + std::size_t{3} * triangle;
+  for (int i = 0; i < 3; ++i)
+    out[i] = part.worldPositions ? part.worldPositions[corner[i]]
+                                 : Vec3(part.worldFromObject * Vec4(part.primitive->positions[corner[i]], 1.0f));
+}
+
+HitSurface RayScene::surfaceAt(const RayPacket& rays, int lane) const {
+  const RTCHit16& hit = rays.rayhit.hit;
+  HitSurface surface;
+  surface.part = partOf(rays, lane);
+  const ScenePart& part = parts_[surface.part];
+  surface.material = part.primitive->material;
+  surface.point = {part.primitive, hit.primID[lane], {hit.u[lane], hit.v[lane]}};
+  Vec3 corner[3];
+  corners(part, hit.primID[lane], corner);
+  const Vec3 e1 = corner[1] - corner[0];
+  const Vec3 e2 = corner[2] - corner[0];
+  surface.p = corner[0] + hit.u[lane] * e1 + hit.v[lane] * e2;
+  const Vec3 front = glm::cross(e1, e2) * part.frontSign;
+  const Vec3 dir(rays.rayhit.ray.dir_x[lane], rays.rayhit.ray.dir_y[lane], rays.rayhit.ray.dir_z[lane]);
+  surface.ng = glm::normalize(front);
+  surface.backFace = glm::dot(dir, surface.ng) > 0.0f;
+  if (surface.backFace) surface.ng = -surface.ng;
+  surface.rayStart = offsetPoint(surface.p, surface.ng, corner, translationOf(part.instance));
+
+  surface.ns = surface.ng;
+  if (!part.primitive->normals.empty()) {
+    const std::uint32_t* index = part.primitive->indices.data() + std::size_t{3} * hit.primID[lane];
+    const auto& normals = part.primitive->normals;
+    const Vec3 n = part.worldFromNormal * ((1.0f - hit.u[lane] - hit.v[lane]) * normals[index[0]] +
+                                           hit.u[lane] * normals[index[1]] + hit.v[lane] * normals[index[2]]);
+    const float length2 = glm::dot(n, n);
+    if (length2 > 0.0f && std::isfinite(length2)) {
+      surface.ns = n / std::sqrt(length2);
+      if (glm::dot(surface.ns, surface.ng) < 0.0f) surface.ns = -surface.ns;
+    }
+  }
+  return surface;
+}
+
+}  // namespace lumel

@@ -1,0 +1,130 @@
+// The casting geometry of a scene for rays: Embree's structures, alpha cut-outs, and what lies at a hit.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "baker/materials.h"
+#include "scene/embree.h"
+#include "scene/expected.h"
+#include "scene/scene.h"
+
+namespace lumel {
+
+/// Rays travel in packets of one lane per texel.
+inline constexpr int kLanes = 16;
+
+/// How a packet is traced. Packet answers like Single but for ties and rounding: a bake uses one throughout.
+enum class TraceMode {
+  Single,    // one call per ray: the plain way, kept as the yardstick
+  Packet,    // rtcIntersect16, for rays without much in common
+  Coherent,  // rtcIntersect16 told that its rays lie close together
+};
+
+/// Up to 16 rays that look for their closest hit. Lanes that are not set are not traced.
+struct alignas(64) RayPacket {
+  RTCRayHit16 rayhit;
+  alignas(64) int valid[kLanes];
+
+  RayPacket() { clear(); }
+  void clear();
+  void set(int lane, const Vec3& origin, const Vec3& dir);
+  bool hit(int lane) const { return valid[lane] != 0 && rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID; }
+};
+
+/// Up to 16 rays that ask only whether anything lies between their ends.
+struct alignas(64) ShadowPacket {
+  RTCRay16 ray;
+  alignas(64) int valid[kLanes];
+  bool any = false;
+
+  ShadowPacket() { clear(); }
+  void clear();
+  /// `length` in units of |dir|.
+  void set(int lane, const Vec3& origin, const Vec3& dir, float length);
+  bool visible(int lane) const { return valid[lane] != 0 && ray.tfar[lane] >= 0.0f; }
+};
+
+/// One primitive of one casting instance.
+struct ScenePart {
+  const Primitive* primitive = nullptr;
+  int instance = 0;
+  const Vec3* worldPositions = nullptr;  // Embree's vertex buffer where the mesh is flattened to world space
+  Mat4 worldFromObject{1.0f};
+  Mat3 worldFromNormal{1.0f};      // cofactor matrix times the sign of the determinant: keeps fronts in front
+  float frontSign = 1.0f;          // -1 for mirroring instances: triangles wind the other way round in world space
+  std::int64_t firstEmitter = -1;  // of its triangles among EmissiveTriangles; -1: it emits nothing
+};
+
+/// A surface found by a ray, both normals on the side that the ray came from.
+struct HitSurface {
+  Vec3 p{0};         // world
+  Vec3 ng{0, 0, 1};  // geometric normal
+  Vec3 ns{0, 0, 1};  // shading normal; dot(ng, ns) >= 0
+  Vec3 rayStart{0};  // of rays that leave it: offsetPoint
+  bool backFace = false;
+  int material = 0;
+  std::uint32_t part = 0;
+  TrianglePoint point;
+};
+
+class RayScene {
+ public:
+  /// Meshes that are placed once are flattened to world space, others become Embree instances. Keeps references to
+  /// `scene` and `materials`. Errors: Failed.
+  static Expected<std::unique_ptr<RayScene>> build(const Scene& scene, const Materials& materials);
+
+  void intersect(RayPacket& rays, TraceMode mode) const;
+  void occluded(ShadowPacket& rays, TraceMode mode) const;
+
+  /// Precondition: rays.hit(lane).
+  HitSurface surfaceAt(const RayPacket& rays, int lane) const;
+
+  const std::vector<ScenePart>& parts() const { return parts_; }
+  std::vector<ScenePart>& parts() { return parts_; }
+  /// World-space corners, as wound in the primitive.
+  void corners(const ScenePart& part, std::uint32_t triangle, Vec3 out[3]) const;
+
+  /// For offsetPoint: an instance's translation where Embree places it, zero where its triangles are in world space.
+  Vec3 translationOf(int instance) const;
+
+  Vec3 boundsMin() const { return boundsMin_; }
+  Vec3 boundsMax() const { return boundsMax_; }
+  bool empty() const { return parts_.empty(); }
+  std::size_t alphaTestedParts() const { return alphaTested_.size(); }
+
+ private:
+  struct AlphaTested {
+    const Materials* materials;
+    const Primitive* primitive;
+  };
+  RayScene(const Scene& scene, const Materials& materials) : scene_(&scene), materials_(&materials) {}
+  Expected<void> buildGeometry();
+  std::uint32_t addParts(int instance);
+  EmbreeGeometry triangles(const Primitive& primitive, const Mat4* worldFromObject, const Vec3** vertices);
+  Expected<RTCScene> meshScene(int mesh);
+  static void alphaFilter(const RTCFilterFunctionNArguments* args);
+  std::uint32_t partOf(const RayPacket& rays, int lane) const;
+
+  const Scene* scene_;
+  const Materials* materials_;
+  EmbreeDevice device_;
+  std::vector<EmbreeScene> meshScenes_;  // per Scene::meshes; null where flattened or unused
+  EmbreeScene top_;
+  std::vector<ScenePart> parts_;
+  std::vector<std::uint32_t> partOfGeometry_;              // per geometry of top_: its part, or an instance's first
+  std::vector<std::unique_ptr<AlphaTested>> alphaTested_;  // Embree holds pointers to them
+  Vec3 boundsMin_{0};
+  Vec3 boundsMax_{0};
+};
+
+/// The start of a ray that leaves p, a point of the triangle, on the side of ng. It is moved along the normal so that
+/// rounding cannot put it behind the surface, and as far towards the triangle's centroid, so that it cannot lie beyond
+/// a wall that stands on the triangle's edge. The distance is a few units in the last place of the largest coordinate
+/// that took part in finding p (after Waechter and Binder 2019; without their fixed distance near the origin, so that
+/// scenes of any size work). `translation`: of the instance, for geometry that Embree places itself; zero else.
+Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const Vec3 corners[3], const Vec3& translation);
+
+}  // namespace lumel

@@ -1,0 +1,273 @@
+#include "lightmap/chart_merging.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <queue>
+
+#include "lightmap/chart_growing.h"
+#include "lightmap/chart_sheet.h"
+#include "lightmap/flatten.h"
+#include "scene/parallel.h"
+
+namespace lumel {
+namespace {
+
+constexpr double kSmoothCrease = 0.25;  // weight of a crease that is shaded smooth
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+struct Border {
+  std::uint32_t a = 0, b = 0;
+  std::vector<MeshEdge> edges;  // from the side of either chart
+  double length = 0, crease = 0;
+  double refusedArea = 0;  // of both charts together when flattening them as one failed
+  bool alive = true;
+};
+
+struct Candidate {
+  float cost;
+  std::uint32_t border;
+  bool operator<(const Candidate& other) const {
+    return cost != other.cost ? cost > other.cost : border > other.border;
+  }
+};
+
+/// How sharply two charts may meet (1 - cos), by the smaller one's size: what is too small to show a difference in
+/// light had better share texels than be alone in a texel with a gutter around it.
+double creaseLimit(double area, double perimeter) {
+  const double width = 2 * area / perimeter;
+  if (area < 4 || width < 0.75) return 1.2;   // just over a right angle
+  if (area < 16 || width < 1.5) return 0.75;  // 75 degrees
+  return 0.5;                                 // 60 degrees
+}
+
+class PartMerger {
+ public:
+  PartMerger(const HalfEdgeMesh& mesh, std::vector<FlatChart*> charts, const std::vector<std::uint32_t>& localTriangle, const MergeOptions& options)
+      : mesh_(mesh), options_(options), charts_(std::move(charts)), sheet_(mesh, charts_, localTriangle) {}
+
+  std::vector<FlatChart> run() {
+    makeBorders();
+    while (!queue_.empty()) {
+      const Candidate top = queue_.top();
+      queue_.pop();
+      if (!borders_[top.border].alive) continue;
+      const double now = cost(borders_[top.border]);
+      if (now > top.cost * 1.0001 + 1e-9) {
+        if (std::isfinite(now)) queue_.push({static_cast<float>(now), top.border});
+        continue;
+      }
+      tryMerge(top.border);
+    }
+    return collect();
+  }
+
+ private:
+  static std::uint64_t key(std::uint32_t a, std::uint32_t b) {
+    return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
+  }
+
+  void makeBorders() {
+    bordersOf_.resize(charts_.size());
+    members_.resize(charts_.size());
+    for (std::uint32_t c = 0; c < charts_.size(); ++c) {
+      members_[c] = {c};
+      const ChartMesh& chart = charts_[c]->mesh;
+      for (const std::uint32_t t : chart.meshTriangles)
+        for (std::uint32_t k = 0; k < 3; ++k)
+          if (mesh_.neighbours[t][k] >= 0) addSide(c, {t, k});
+    }
+    for (std::uint32_t i = 0; i < borders_.size(); ++i) push(i);
+  }
+
+  void addSide(std::uint32_t c, MeshEdge edge) {
+    const auto other = static_cast<std::uint32_t>(mesh_.neighbours[edge.triangle][edge.k]);
+    const std::uint32_t d = sheet_.chartOf(other);
+    if (d <= c) return;  // a cut inside a chart, or met from the other side
+    const auto [place, isNew] = borderOf_.try_emplace(key(c, d), static_cast<std::uint32_t>(borders_.size()));
+    if (isNew) {
+      borders_.push_back({c, d, {}, 0, 0, 0, true});
+      bordersOf_[c].push_back(place->second);
+      bordersOf_[d].push_back(place->second);
+    }
+    Border& border = borders_[place->second];
+    border.edges.push_back(edge);
+    const Vec3d n = areaNormal(mesh_, edge.triangle);
+    const Vec3d m = areaNormal(mesh_, other);
+    const double bend = 1 - glm::dot(n, m) / (glm::length(n) * glm::length(m));
+    const double length = sheet_.length(edge);
+    border.length += length;
+    border.crease += length * std::max(0.0, bend) * (mesh_.hard[edge.triangle][edge.k] ? 1.0 : kSmoothCrease);
+  }
+
+  void push(std::uint32_t border) {
+    if (const double c = cost(borders_[border]); std::isfinite(c)) queue_.push({static_cast<float>(c), border});
+  }
+
+  double cost(const Border& border) const {
+    const ChartSheet::Chart& a = sheet_.chart(border.a);
+    const ChartSheet::Chart& b = sheet_.chart(border.b);
+    const ChartSheet::Chart& smaller = a.normals.area < b.normals.area ? a : b;
+    const double crease = border.crease / border.length;
+    if (crease > creaseLimit(smaller.normals.area, smaller.perimeter)) return kNever;
+    return crease + 0.5 * std::max(0.0, 1 - 2 * border.length / smaller.perimeter);
+  }
+
+  void tryMerge(std::uint32_t index) {
+    Border& border = borders_[index];
+    std::uint32_t into = border.a;
+    std::uint32_t from = border.b;
+    if (sheet_.chart(into).triangles.size() < sheet_.chart(from).triangles.size()) std::swap(into, from);
+    std::vector<MeshEdge> shared;
+    for (const MeshEdge edge : border.edges) shared.push_back(sheet_.chartOf(edge.triangle) == into ? edge : sheet_.beyond(edge));
+    if (moveTo(border, into, from, shared) || flattenAsOne(border, into, from, shared)) merged(index, into, from);
+  }
+
+  /// Joins the charts as they are, by a rigid motion.
+  bool moveTo(const Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared) {
+    RigidMotion motion;
+    std::vector<MeshEdge> matched;
+    if (!sheet_.fit(shared, smallChartSlack(sheet_.chart(from).normals.area), motion, matched)) return false;
+    double matchedLength = 0;
+    for (const MeshEdge edge : matched) matchedLength += sheet_.length(edge);
+    constexpr double kLeastMatch = 0.25;  // of the common border: half a pipe meets the other half along one of two
+    if (matchedLength < kLeastMatch * border.length || !sheet_.mayJoin(into, from, motion, matched, options_)) return false;
+    sheet_.join(into, from, motion, matched);
+    return true;
+  }
+
+  /// Flattens both anew as one chart: for curved surfaces, whose borders do not meet rigidly.
+  bool flattenAsOne(Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared) {
+    constexpr std::size_t kMostTriangles = 4000;   // keeps the number of flattenings times their cost near linear
+    constexpr double kMostConeVariance = 0.06;     // not worth the attempt
+    constexpr double kLeastBorder = 0.1;           // of the smaller one's perimeter: no chart with a narrow waist
+    constexpr double kGrowth = 1.3;                // since the last attempt
+    const ChartSheet::Chart& a = sheet_.chart(into);
+    const ChartSheet::Chart& b = sheet_.chart(from);
+    if (a.triangles.size() + b.triangles.size() > kMostTriangles) return false;
+    const NormalMoments both(a.normals, b.normals);
+    if (both.area < kGrowth * border.refusedArea || border.length < kLeastBorder * std::min(a.perimeter, b.perimeter)) return false;
+    border.refusedArea = both.area;
+    if (both.coneVariance() > kMostConeVariance * smallChartSlack(both.area)) return false;
+    FlatChart flat;
+    flat.mesh = sheet_.together(into, from, shared);
+    Flattening flattened = flatten(flat.mesh, {options_.maxStretch, options_.largestSide});
+    if (!flattened.valid) return false;
+    flat.uvs = std::move(flattened.uvs);
+    sheet_.replace(into, from, flat);
+    return true;
+  }
+
+  void merged(std::uint32_t index, std::uint32_t into, std::uint32_t from) {
+    members_[into].insert(members_[into].end(), members_[from].begin(), members_[from].end());
+    members_[from].clear();
+    borders_[index].alive = false;
+    for (const std::uint32_t moved : bordersOf_[from]) moveBorder(moved, from, into);
+    bordersOf_[from].clear();
+    // What was refused may fit the grown chart.
+    for (const std::uint32_t i : bordersOf_[into])
+      if (borders_[i].alive) push(i);
+  }
+
+  void moveBorder(std::uint32_t moved, std::uint32_t from, std::uint32_t to) {
+    Border& border = borders_[moved];
+    if (!border.alive) return;
+    const std::uint32_t other = border.a == from ? border.b : border.a;
+    const auto [place, isNew] = borderOf_.try_emplace(key(to, other), moved);
+    if (isNew) {
+      border.a = to;
+      border.b = other;
+      bordersOf_[to].push_back(moved);
+      return;
+    }
+    Border& kept = borders_[place->second];
+    kept.edges.insert(kept.edges.end(), border.edges.begin(), border.edges.end());
+    kept.length += border.length;
+    kept.crease += border.crease;
+    border.alive = false;
+    border.edges = {};
+  }
+
+  std::vector<FlatChart> collect() {
+    std::vector<FlatChart> result;
+    for (std::uint32_t c = 0; c < charts_.size(); ++c) {
+      if (members_[c].empty()) continue;
+      if (members_[c].size() == 1) {
+        result.push_back(std::move(*charts_[c]));
+        continue;
+      }
+      FlatChart merged = sheet_.take(c);
+      // The border test does not see everything (slivers along a border): what fails in full stays apart.
+      constexpr double kOverlapTexels = 2e-3;
+      if (!overlapsItself(merged.mesh, merged.uvs, kOverlapTexels)) {
+        result.push_back(std::move(merged));
+      } else {
+        for (const std::uint32_t member : members_[c]) result.push_back(std::move(*charts_[member]));
+      }
+    }
+    return result;
+  }
+
+  const HalfEdgeMesh& mesh_;
+  const MergeOptions& options_;
+  std::vector<FlatChart*> charts_;
+  ChartSheet sheet_;
+  std::vector<Border> borders_;
+  std::vector<std::vector<std::uint32_t>> bordersOf_;  // per chart
+  std::vector<std::vector<std::uint32_t>> members_;    // per chart: the charts that it is made of
+  std::unordered_map<std::uint64_t, std::uint32_t> borderOf_;  // looked up only; keys of merged charts are left behind
+  std::priority_queue<Candidate> queue_;
+};
+
+std::uint32_t findRoot(std::vector<std::uint32_t>& parent, std::uint32_t x) {
+  while (parent[x] != x) x = parent[x] = parent[parent[x]];
+  return x;
+}
+
+}  // namespace
+
+std::vector<FlatChart> mergeCharts(const HalfEdgeMesh& mesh, std::vector<FlatChart> charts, const MergeOptions& options) {
+  std::vector<std::uint32_t> chartOf(mesh.size(), 0);
+  for (std::uint32_t c = 0; c < charts.size(); ++c)
+    for (const std::uint32_t t : charts[c].mesh.meshTriangles) chartOf[t] = c;
+  std::vector<std::uint32_t> parent(charts.size());
+  std::iota(parent.begin(), parent.end(), 0u);
+  for (std::uint32_t t = 0; t < mesh.size(); ++t)
+    for (const std::int32_t n : mesh.neighbours[t]) {
+      if (n < 0) continue;
+      const std::uint32_t a = findRoot(parent, chartOf[t]);
+      const std::uint32_t b = findRoot(parent, chartOf[static_cast<std::size_t>(n)]);
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  std::vector<std::vector<FlatChart*>> parts;
+  std::vector<std::uint32_t> partOf(charts.size(), 0);
+  std::vector<std::uint32_t> localTriangle(mesh.size(), 0);
+  std::vector<std::uint32_t> partTriangles;
+  for (std::uint32_t c = 0; c < charts.size(); ++c) {
+    const std::uint32_t root = findRoot(parent, c);
+    if (root == c) {
+      partOf[c] = static_cast<std::uint32_t>(parts.size());
+      parts.emplace_back();
+      partTriangles.push_back(0);
+    }
+    const std::uint32_t part = partOf[root];
+    parts[part].push_back(&charts[c]);
+    for (const std::uint32_t t : charts[c].mesh.meshTriangles) localTriangle[t] = partTriangles[part]++;
+  }
+  std::vector<std::vector<FlatChart>> merged(parts.size());
+  parallelFor(parts.size(), 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      if (parts[i].size() == 1)
+        merged[i].push_back(std::move(*parts[i][0]));
+      else
+        merged[i] = PartMerger(mesh, parts[i], localTriangle, options).run();
+    }
+  });
+  std::vector<FlatChart> result;
+  for (std::vector<FlatChart>& part : merged)
+    for (FlatChart& chart : part) result.push_back(std::move(chart));
+  return result;
+}
+
+}  // namespace lumel

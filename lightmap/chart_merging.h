@@ -1,0 +1,26 @@
+// Joining of flattened charts along common borders: a chart is moved rigidly to where its border meets its neighbour's.
+// Cylinders, cones and arches unroll whole this way (the last edge stays a seam), and small charts find a larger one.
+#pragma once
+
+#include <vector>
+
+#include "lightmap/chart_mesh.h"
+
+namespace lumel {
+
+struct FlatChart {
+  ChartMesh mesh;
+  std::vector<Vec2d> uvs;  // texels, y up
+};
+
+struct MergeOptions {
+  double maxStretch = 1.25;
+  double largestSide = 1000.0;  // texels
+};
+
+/// Merges what can be merged without overlap, stretch beyond the limit, or a crease that light would show: cheapest
+/// pair first, where sharp creases, short common borders and large charts are dear. Charts too small to hold detail
+/// (a few texels) may be joined over sharper creases. Parallel over the mesh's connected parts, deterministic.
+std::vector<FlatChart> mergeCharts(const HalfEdgeMesh& mesh, std::vector<FlatChart> charts, const MergeOptions& options);
+
+}  // namespace lumel

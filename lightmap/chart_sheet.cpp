@@ -1,0 +1,359 @@
+#include "lightmap/chart_sheet.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lumel {
+namespace {
+
+constexpr double kOverlapTexels = 2e-3;
+constexpr double kMatchTexels = 0.25;    // how far welding may move a point
+constexpr double kMatchShare = 0.05;     // ... and of the edge's length
+constexpr int kSeeds = 4;                // edges that are tried as the one that matches
+
+std::uint64_t cellKey(std::int64_t x, std::int64_t y) {
+  return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32) | static_cast<std::uint32_t>(y);
+}
+
+/// Whether along an edge normal of `a` the triangles come apart, up to the tolerance.
+bool separated(const std::array<Vec2d, 3>& a, const std::array<Vec2d, 3>& b) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec2d edge = a[(k + 1) % 3] - a[k];
+    const double length = glm::length(edge);
+    if (!(length > 0)) continue;
+    const Vec2d outward(edge.y / length, -edge.x / length);
+    const double reach = std::min({glm::dot(outward, b[0] - a[k]), glm::dot(outward, b[1] - a[k]), glm::dot(outward, b[2] - a[k])});
+    if (reach > -kOverlapTexels) return true;
+  }
+  return false;
+}
+
+double doubleArea(const std::array<Vec2d, 3>& t) { return cross2(t[1] - t[0], t[2] - t[0]); }
+
+/// Best motion of points `b` onto points `a` (Procrustes in the plane).
+RigidMotion procrustes(const std::vector<std::array<Vec2d, 4>>& edges) {
+  double weight = 0;
+  Vec2d centreA(0.0), centreB(0.0);
+  for (const auto& e : edges) {
+    const double w = glm::length(e[1] - e[0]) + 1e-12;
+    weight += 2 * w;
+    centreA += w * (e[0] + e[1]);
+    centreB += w * (e[2] + e[3]);
+  }
+  centreA /= weight;
+  centreB /= weight;
+  double cosine = 0, sine = 0;
+  for (const auto& e : edges) {
+    const double w = glm::length(e[1] - e[0]) + 1e-12;
+    for (std::size_t i = 0; i < 2; ++i) {
+      cosine += w * glm::dot(e[2 + i] - centreB, e[i] - centreA);
+      sine += w * cross2(e[2 + i] - centreB, e[i] - centreA);
+    }
+  }
+  const double size = std::hypot(cosine, sine);
+  RigidMotion motion;
+  if (size > 0) {
+    motion.cosine = cosine / size;
+    motion.sine = sine / size;
+  }
+  motion.shift = centreA - motion.apply(centreB);
+  return motion;
+}
+
+bool matches(const std::array<Vec2d, 4>& e, const RigidMotion& motion, double slack) {
+  const double limit = std::min(kMatchTexels, kMatchShare * slack * glm::length(e[1] - e[0]) + 1e-6);
+  return glm::length(motion.apply(e[2]) - e[0]) <= limit && glm::length(motion.apply(e[3]) - e[1]) <= limit;
+}
+
+}  // namespace
+
+ChartSheet::ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& charts, const std::vector<std::uint32_t>& localTriangle)
+    : mesh_(mesh), localTriangle_(localTriangle) {
+  std::size_t triangles = 0;
+  for (const FlatChart* flat : charts) triangles += flat->mesh.triangles.size();
+  chartOf_.resize(triangles);
+  cornerVertex_.resize(triangles);
+  joined_.resize(triangles);
+  charts_.resize(charts.size());
+  double borderLength = 0;
+  std::size_t borderEdges = 0;
+  for (std::uint32_t c = 0; c < charts.size(); ++c) {
+    addTriangles(c, *charts[c]);
+    borderLength += charts_[c].perimeter;
+    for (const auto& neighbours : charts[c]->mesh.neighbours)
+      borderEdges += static_cast<std::size_t>(std::count(neighbours.begin(), neighbours.end(), -1));
+  }
+  constexpr double kLargestCell = 4.0;
+  cell_ = std::min(kLargestCell, borderLength / static_cast<double>(std::max<std::size_t>(borderEdges, 1)));
+  for (Chart& chart : charts_)
+    for (const std::uint32_t t : chart.triangles)
+      for (std::uint32_t k = 0; k < 3; ++k)
+        if (!joined_[localTriangle_[t]][k]) insertBorder(chart, {t, k});
+}
+
+/// Sets a chart from its own mesh; its border is not yet entered in the cells.
+void ChartSheet::addTriangles(std::uint32_t index, const FlatChart& flat) {
+  Chart& chart = charts_[index];
+  chart = {};
+  const auto base = static_cast<std::uint32_t>(uvs_.size());
+  uvs_.insert(uvs_.end(), flat.uvs.begin(), flat.uvs.end());
+  for (std::uint32_t i = 0; i < flat.uvs.size(); ++i) {
+    chart.vertices.push_back(base + i);
+    parent_.push_back(base + i);
+  }
+  chart.triangles = flat.mesh.meshTriangles;
+  chart.low = chart.high = flat.uvs[0];
+  for (const Vec2d uv : flat.uvs) {
+    chart.low = glm::min(chart.low, uv);
+    chart.high = glm::max(chart.high, uv);
+  }
+  for (std::size_t t = 0; t < flat.mesh.triangles.size(); ++t) {
+    const std::uint32_t triangle = flat.mesh.meshTriangles[t];
+    const std::uint32_t local = localTriangle_[triangle];
+    chartOf_[local] = index;
+    chart.normals = NormalMoments(chart.normals, NormalMoments(areaNormal(mesh_, triangle)));
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      cornerVertex_[local][k] = base + flat.mesh.triangles[t][k];
+      joined_[local][k] = flat.mesh.neighbours[t][k] >= 0;
+      if (!joined_[local][k]) chart.perimeter += length({triangle, k});
+    }
+  }
+}
+
+std::uint32_t ChartSheet::vertexAt(std::uint32_t triangle, std::uint32_t k) const {
+  std::uint32_t x = cornerVertex_[localTriangle_[triangle]][k];
+  while (parent_[x] != x) x = parent_[x] = parent_[parent_[x]];
+  return x;
+}
+
+std::array<Vec2d, 3> ChartSheet::corners(std::uint32_t triangle) const {
+  return {uvs_[vertexAt(triangle, 0)], uvs_[vertexAt(triangle, 1)], uvs_[vertexAt(triangle, 2)]};
+}
+
+MeshEdge ChartSheet::beyond(MeshEdge edge) const {
+  const auto other = static_cast<std::uint32_t>(mesh_.neighbours[edge.triangle][edge.k]);
+  const std::uint32_t end = mesh_.triangles[edge.triangle][(edge.k + 1) % 3];
+  for (std::uint32_t k = 0; k < 3; ++k)
+    if (mesh_.triangles[other][k] == end && mesh_.neighbours[other][k] == static_cast<std::int32_t>(edge.triangle)) return {other, k};
+  return {other, 0};
+}
+
+double ChartSheet::length(MeshEdge edge) const {
+  const auto& v = mesh_.triangles[edge.triangle];
+  return glm::length(mesh_.points[v[(edge.k + 1) % 3]] - mesh_.points[v[edge.k]]);
+}
+
+/// Cells along a segment, each at least once.
+template <class Visit>
+void ChartSheet::visitCells(Vec2d a, Vec2d b, Visit visit) const {
+  const double low = std::min(a.y, b.y);
+  const double high = std::max(a.y, b.y);
+  const auto index = [this](double x) { return static_cast<std::int64_t>(std::floor(x / cell_)); };
+  for (std::int64_t y = index(low); y <= index(high); ++y) {
+    const double y0 = static_cast<double>(y) * cell_;
+    double x0 = a.x, x1 = b.x;
+    if (a.y != b.y) {
+      const double s0 = std::clamp((y0 - a.y) / (b.y - a.y), 0.0, 1.0);
+      const double s1 = std::clamp((y0 + cell_ - a.y) / (b.y - a.y), 0.0, 1.0);
+      x0 = a.x + s0 * (b.x - a.x);
+      x1 = a.x + s1 * (b.x - a.x);
+    }
+    for (std::int64_t x = index(std::min(x0, x1)); x <= index(std::max(x0, x1)); ++x) visit(cellKey(x, y));
+  }
+}
+
+void ChartSheet::insertBorder(Chart& chart, MeshEdge edge) {
+  const Vec2d a = uvs_[vertexAt(edge.triangle, edge.k)];
+  const Vec2d b = uvs_[vertexAt(edge.triangle, (edge.k + 1) % 3)];
+  visitCells(a, b, [&](std::uint64_t key) { chart.border[key].push_back(edge); });
+}
+
+bool ChartSheet::fit(const std::vector<MeshEdge>& shared, double slack, RigidMotion& motion, std::vector<MeshEdge>& matched) const {
+  std::vector<std::array<Vec2d, 4>> edges;  // ends in `into`, then the same ends in `from`
+  for (const MeshEdge into : shared) {
+    const MeshEdge from = beyond(into);
+    edges.push_back({uvs_[vertexAt(into.triangle, into.k)], uvs_[vertexAt(into.triangle, (into.k + 1) % 3)],
+                     uvs_[vertexAt(from.triangle, (from.k + 1) % 3)], uvs_[vertexAt(from.triangle, from.k)]});
+  }
+  std::vector<std::vector<std::array<Vec2d, 4>>> seeds = {edges};
+  std::vector<std::size_t> order(edges.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return glm::length(edges[a][1] - edges[a][0]) > glm::length(edges[b][1] - edges[b][0]);
+  });
+  for (std::size_t i = 0; i < std::min<std::size_t>(kSeeds, order.size()) && edges.size() > 1; ++i)
+    seeds.push_back({edges[order[i * order.size() / std::min<std::size_t>(kSeeds, order.size())]]});
+
+  double best = 0;
+  for (const auto& seed : seeds) {
+    RigidMotion trial = procrustes(seed);
+    for (int refinement = 0; refinement < 2; ++refinement) {
+      std::vector<std::array<Vec2d, 4>> good;
+      std::vector<MeshEdge> goodEdges;
+      double total = 0;
+      for (std::size_t i = 0; i < edges.size(); ++i) {
+        if (!matches(edges[i], trial, slack)) continue;
+        good.push_back(edges[i]);
+        goodEdges.push_back(shared[i]);
+        total += glm::length(edges[i][1] - edges[i][0]);
+      }
+      if (good.empty()) break;
+      if (total > best * (1 + 1e-9)) {
+        best = total;
+        matched = std::move(goodEdges);
+        motion = trial;
+      }
+      trial = procrustes(good);
+    }
+    if (matched.size() == edges.size()) break;
+  }
+  return best > 0;
+}
+
+bool ChartSheet::staysGood(std::uint32_t triangle, const std::array<Vec2d, 3>& uv, double maxStretch) const {
+  const auto& v = mesh_.triangles[triangle];
+  const Vec3d a = mesh_.points[v[1]] - mesh_.points[v[0]];
+  const Vec3d b = mesh_.points[v[2]] - mesh_.points[v[0]];
+  const double x1 = glm::length(a);
+  const double x2 = glm::dot(a, b) / x1;
+  const double y2 = glm::length(glm::cross(a, b)) / x1;
+  const Vec2d jx = (uv[1] - uv[0]) / x1;
+  const Vec2d jy = (uv[2] - uv[0] - jx * x2) / y2;
+  const double det = cross2(jx, jy);
+  if (!(det > 0)) return false;
+  const double trace = glm::dot(jx, jx) + glm::dot(jy, jy);
+  const double big = std::sqrt((trace + std::sqrt(std::max(0.0, trace * trace - 4 * det * det))) / 2);
+  return big <= maxStretch && det / big * maxStretch >= 1;
+}
+
+bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const RigidMotion& motion, const std::vector<MeshEdge>& matched,
+                         const MergeOptions& options) const {
+  const Chart& target = charts_[into];
+  const Chart& moved = charts_[from];
+  std::unordered_map<std::uint32_t, Vec2d> welded;  // looked up only
+  for (const MeshEdge edge : matched) {
+    const MeshEdge other = beyond(edge);
+    welded[vertexAt(other.triangle, other.k)] = uvs_[vertexAt(edge.triangle, (edge.k + 1) % 3)];
+    welded[vertexAt(other.triangle, (other.k + 1) % 3)] = uvs_[vertexAt(edge.triangle, edge.k)];
+  }
+  Vec2d low = target.low, high = target.high;
+  const double maxStretch = options.maxStretch * std::sqrt(smallChartSlack(moved.normals.area));
+  for (const std::uint32_t t : moved.triangles) {
+    std::array<Vec2d, 3> uv = corners(t);
+    bool touched = false;
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const auto place = welded.find(vertexAt(t, k));
+      touched = touched || place != welded.end();
+      uv[k] = place != welded.end() ? place->second : motion.apply(uv[k]);
+      low = glm::min(low, uv[k]);
+      high = glm::max(high, uv[k]);
+    }
+    if (touched && doubleArea(corners(t)) > 0 && !staysGood(t, uv, maxStretch)) return false;
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      if (joined_[localTriangle_[t]][k]) continue;
+      bool hit = false;
+      visitCells(uv[k], uv[(k + 1) % 3], [&](std::uint64_t key) {
+        const auto cell = target.border.find(key);
+        if (cell == target.border.end() || hit) return;
+        for (const MeshEdge edge : cell->second) {
+          const std::array<Vec2d, 3> other = corners(edge.triangle);
+          if (doubleArea(other) > 0 && doubleArea(uv) > 0 && !separated(uv, other) && !separated(other, uv)) hit = true;
+        }
+      });
+      if (hit) return false;
+    }
+  }
+  return packsWell(high - low, target.normals.area + moved.normals.area, options.largestSide);
+}
+
+void ChartSheet::join(std::uint32_t into, std::uint32_t from, const RigidMotion& motion, const std::vector<MeshEdge>& matched) {
+  Chart& target = charts_[into];
+  Chart& moved = charts_[from];
+  for (const std::uint32_t v : moved.vertices)
+    if (parent_[v] == v) uvs_[v] = motion.apply(uvs_[v]);
+  for (const MeshEdge edge : matched) {
+    const MeshEdge other = beyond(edge);
+    const std::array<std::uint32_t, 2> keep = {vertexAt(edge.triangle, edge.k), vertexAt(edge.triangle, (edge.k + 1) % 3)};
+    const std::array<std::uint32_t, 2> drop = {vertexAt(other.triangle, (other.k + 1) % 3), vertexAt(other.triangle, other.k)};
+    for (std::size_t i = 0; i < 2; ++i)
+      if (keep[i] != drop[i]) parent_[drop[i]] = keep[i];
+    joined_[localTriangle_[edge.triangle]][edge.k] = true;
+    joined_[localTriangle_[other.triangle]][other.k] = true;
+    target.perimeter -= 2 * length(edge);
+  }
+  target.perimeter += moved.perimeter;
+  target.normals = NormalMoments(target.normals, moved.normals);
+  for (const std::uint32_t t : moved.triangles) {
+    chartOf_[localTriangle_[t]] = into;
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const Vec2d uv = uvs_[vertexAt(t, k)];
+      target.low = glm::min(target.low, uv);
+      target.high = glm::max(target.high, uv);
+      if (!joined_[localTriangle_[t]][k]) insertBorder(target, {t, k});
+    }
+  }
+  target.triangles.insert(target.triangles.end(), moved.triangles.begin(), moved.triangles.end());
+  target.vertices.insert(target.vertices.end(), moved.vertices.begin(), moved.vertices.end());
+  moved = {};
+}
+
+ChartMesh ChartSheet::together(std::uint32_t a, std::uint32_t b, const std::vector<MeshEdge>& shared) const {
+  ChartMesh mesh;
+  std::vector<std::uint32_t>& all = mesh.meshTriangles;
+  all = charts_[a].triangles;
+  all.insert(all.end(), charts_[b].triangles.begin(), charts_[b].triangles.end());
+  std::sort(all.begin(), all.end());
+  const auto indexOf = [&all](std::uint32_t triangle) {
+    return static_cast<std::uint32_t>(std::lower_bound(all.begin(), all.end(), triangle) - all.begin());
+  };
+  for (const std::uint32_t t : all) {
+    std::array<std::int32_t, 3> neighbours = {-1, -1, -1};
+    for (std::uint32_t k = 0; k < 3; ++k)
+      if (joined_[localTriangle_[t]][k]) neighbours[k] = static_cast<std::int32_t>(indexOf(static_cast<std::uint32_t>(mesh_.neighbours[t][k])));
+    mesh.neighbours.push_back(neighbours);
+  }
+  for (const MeshEdge edge : shared) {
+    const MeshEdge other = beyond(edge);
+    mesh.neighbours[indexOf(edge.triangle)][edge.k] = static_cast<std::int32_t>(indexOf(other.triangle));
+    mesh.neighbours[indexOf(other.triangle)][other.k] = static_cast<std::int32_t>(indexOf(edge.triangle));
+  }
+  weldCorners(mesh_, mesh);
+  return mesh;
+}
+
+void ChartSheet::replace(std::uint32_t into, std::uint32_t from, const FlatChart& flat) {
+  charts_[from] = {};
+  addTriangles(into, flat);
+  for (const std::uint32_t t : flat.mesh.meshTriangles)
+    for (std::uint32_t k = 0; k < 3; ++k)
+      if (!joined_[localTriangle_[t]][k]) insertBorder(charts_[into], {t, k});
+}
+
+FlatChart ChartSheet::take(std::uint32_t index) const {
+  FlatChart flat;
+  flat.mesh.meshTriangles = charts_[index].triangles;
+  std::sort(flat.mesh.meshTriangles.begin(), flat.mesh.meshTriangles.end());
+  std::unordered_map<std::uint32_t, std::uint32_t> vertexOf;  // looked up only
+  const std::vector<std::uint32_t>& all = flat.mesh.meshTriangles;
+  for (const std::uint32_t t : all) {
+    std::array<std::uint32_t, 3> triangle;
+    std::array<std::int32_t, 3> neighbours = {-1, -1, -1};
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t vertex = vertexAt(t, k);
+      const auto [place, isNew] = vertexOf.try_emplace(vertex, static_cast<std::uint32_t>(flat.mesh.points.size()));
+      if (isNew) {
+        flat.mesh.points.push_back(mesh_.points[mesh_.triangles[t][k]]);
+        flat.uvs.push_back(uvs_[vertex]);
+      }
+      triangle[k] = place->second;
+      if (!joined_[localTriangle_[t]][k]) continue;
+      const auto other = std::lower_bound(all.begin(), all.end(), static_cast<std::uint32_t>(mesh_.neighbours[t][k]));
+      neighbours[k] = static_cast<std::int32_t>(other - all.begin());
+    }
+    flat.mesh.triangles.push_back(triangle);
+    flat.mesh.neighbours.push_back(neighbours);
+  }
+  return flat;
+}
+
+}  // namespace lumel

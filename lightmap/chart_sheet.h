@@ -1,0 +1,83 @@
+// Flattened charts that are being joined: UVs shared between charts' corners, and what lies where along their borders.
+#pragma once
+
+#include <unordered_map>
+
+#include "lightmap/chart_growing.h"
+#include "lightmap/chart_merging.h"
+
+namespace lumel {
+
+/// Rotation and shift of the plane.
+struct RigidMotion {
+  double cosine = 1, sine = 0;
+  Vec2d shift{0.0};
+
+  Vec2d apply(Vec2d p) const { return Vec2d(cosine * p.x - sine * p.y, sine * p.x + cosine * p.y) + shift; }
+};
+
+/// An edge of the mesh by the triangle that it belongs to: from corner k to k + 1.
+struct MeshEdge {
+  std::uint32_t triangle = 0;
+  std::uint32_t k = 0;
+};
+
+class ChartSheet {
+ public:
+  struct Chart {
+    std::vector<std::uint32_t> triangles;  // of the mesh
+    std::vector<std::uint32_t> vertices;   // of the sheet
+    NormalMoments normals;
+    double perimeter = 0;                  // texels
+    Vec2d low{0.0}, high{0.0};
+    std::unordered_map<std::uint64_t, std::vector<MeshEdge>> border;  // by cell; looked up only
+  };
+
+  ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& charts, const std::vector<std::uint32_t>& localTriangle);
+
+  const Chart& chart(std::uint32_t i) const { return charts_[i]; }
+  std::uint32_t chartOf(std::uint32_t meshTriangle) const { return chartOf_[localTriangle_[meshTriangle]]; }
+  MeshEdge beyond(MeshEdge edge) const;
+
+  /// How a chart must move so that its side of the shared edges meets the other side, from which they are given; fills
+  /// `matched` with the edges that do meet. `slack` multiplies the tolerance. False: none meets.
+  bool fit(const std::vector<MeshEdge>& shared, double slack, RigidMotion& motion, std::vector<MeshEdge>& matched) const;
+
+  /// Whether `from`, moved and welded at `matched`, keeps within the limits and lies on nothing of `into`.
+  bool mayJoin(std::uint32_t into, std::uint32_t from, const RigidMotion& motion, const std::vector<MeshEdge>& matched,
+               const MergeOptions& options) const;
+
+  void join(std::uint32_t into, std::uint32_t from, const RigidMotion& motion, const std::vector<MeshEdge>& matched);
+
+  /// The two charts as one mesh, joined along `shared` as well (edges from the side of either), without UVs.
+  ChartMesh together(std::uint32_t a, std::uint32_t b, const std::vector<MeshEdge>& shared) const;
+
+  /// Replaces the two charts by `into` with a new flattening of both.
+  void replace(std::uint32_t into, std::uint32_t from, const FlatChart& flat);
+
+  /// The chart as a mesh of its own, cut where edges were not welded.
+  FlatChart take(std::uint32_t chart) const;
+
+  double length(MeshEdge edge) const;
+
+ private:
+  std::uint32_t vertexAt(std::uint32_t triangle, std::uint32_t k) const;
+  std::array<Vec2d, 3> corners(std::uint32_t triangle) const;
+  template <class Visit>
+  void visitCells(Vec2d a, Vec2d b, Visit visit) const;
+  void addTriangles(std::uint32_t index, const FlatChart& flat);
+  void insertBorder(Chart& chart, MeshEdge edge);
+  bool staysGood(std::uint32_t triangle, const std::array<Vec2d, 3>& uv, double maxStretch) const;
+
+  const HalfEdgeMesh& mesh_;
+  const std::vector<std::uint32_t>& localTriangle_;  // of the mesh's triangles: index within this sheet
+  std::vector<Chart> charts_;
+  std::vector<std::uint32_t> chartOf_;                        // per local triangle
+  std::vector<std::array<std::uint32_t, 3>> cornerVertex_;    // per local triangle
+  std::vector<std::array<bool, 3>> joined_;                   // per local triangle and edge
+  mutable std::vector<std::uint32_t> parent_;                 // union-find over vertices
+  std::vector<Vec2d> uvs_;
+  double cell_ = 1.0;
+};
+
+}  // namespace lumel

@@ -1,0 +1,138 @@
+#include "lightmap/pack_shape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "lightmap/raster.h"
+#include "scene/parallel.h"
+
+namespace lumel {
+namespace {
+
+/// Slanted edges cover what lies this close too (in texels): UVs are rounded to float after packing.
+constexpr double kEdgeMargin = 1.0 / 512;
+
+/// Shapes whose boxes have more texels gain too little by a shift of less than one.
+constexpr double kMostTexelsToShift = 16384;
+
+bool isFiniteTriangle(const std::array<Vec2, 3>& t) {
+  for (const Vec2& p : t)
+    if (!std::isfinite(p.x) || !std::isfinite(p.y)) return false;
+  return true;
+}
+
+bool hasArea(const std::array<Vec2, 3>& t) {
+  const Vec2d a(t[0]), b(t[1]), c(t[2]);
+  return (b.x - a.x) * (c.y - a.y) != (c.x - a.x) * (b.y - a.y);
+}
+
+struct Box {
+  Vec2d low{std::numeric_limits<double>::infinity()};
+  Vec2d high{-std::numeric_limits<double>::infinity()};
+  bool hasArea = false;
+};
+
+Box boxOf(const PackShape& source) {
+  Box box;
+  for (const auto& triangle : source.triangles) {
+    if (!isFiniteTriangle(triangle)) continue;
+    for (const Vec2& p : triangle) {
+      box.low = glm::min(box.low, Vec2d(p));
+      box.high = glm::max(box.high, Vec2d(p));
+    }
+    box.hasArea = box.hasArea || hasArea(triangle);
+  }
+  return box;
+}
+
+/// The texels that the shape may touch once moved by `offset`.
+Bitmap touchedTexels(const PackShape& source, const Vec2d& offset, const Vec2d& size) {
+  Bitmap texels(static_cast<int>(size.x), static_cast<int>(size.y));
+  for (const auto& triangle : source.triangles) {
+    if (!isFiniteTriangle(triangle)) continue;
+    std::array<Vec2d, 3> p;
+    for (std::size_t i = 0; i < 3; ++i) p[i] = snapToTexelBorder(Vec2d(triangle[i]) + offset);
+    forEachTexelSpan(p, {0, 0, texels.width(), texels.height()}, kEdgeMargin,
+                     [&](int y, int x0, int x1) { texels.setSpan(y, x0, x1); });
+  }
+  return texels;
+}
+
+/// Moves the shape to the origin and marks its texels. Its box rarely ends on a texel border; of the ways to share out
+/// that slack, the one that touches the fewest texels (the even one if there is no better).
+void rasterise(const PackShape& source, GridShape& shape) {
+  const Box box = boxOf(source);
+  if (box.low.x > box.high.x) return;
+  shape.toBitmap = -box.low;
+  if (!box.hasArea) return;
+  const Vec2d extent = box.high - box.low;
+  shape.size = glm::max(Vec2d(1.0), glm::ceil(extent - kTexelSnap));
+  if (std::max(shape.size.x, shape.size.y) > kLargestPage) return;  // refused by its size
+  const Vec2d slack = shape.size - extent;
+  shape.toBitmap = 0.5 * slack - box.low;
+  shape.texels = touchedTexels(source, shape.toBitmap, shape.size);
+  const bool isBox = shape.texels.count() == static_cast<std::size_t>(shape.size.x * shape.size.y);
+  if (isBox || shape.size.x * shape.size.y > kMostTexelsToShift) return;
+  std::size_t fewest = shape.texels.count();
+  for (const double shareY : {0.0, 0.5, 1.0})
+    for (const double shareX : {0.0, 0.5, 1.0}) {
+      const Vec2d offset = Vec2d(shareX, shareY) * slack - box.low;
+      Bitmap texels = touchedTexels(source, offset, shape.size);
+      const std::size_t count = texels.count();
+      if (count >= fewest) continue;
+      fewest = count;
+      shape.toBitmap = offset;
+      shape.texels = std::move(texels);
+    }
+}
+
+Bitmap turned(const Bitmap& texels, int quarterTurns) {
+  Bitmap result = texels;
+  for (int i = 0; i < quarterTurns; ++i) result = quarterTurn(result);
+  return result;
+}
+
+void makeOrientations(bool mayRotate, const GridSettings& settings, GridShape& shape) {
+  Bitmap texels = shape.texels;
+  for (int turn = 0; turn < (mayRotate ? 4 : 1); ++turn) {
+    if (turn > 0) texels = quarterTurn(texels);
+    const Bitmap cells = settings.block > 1 ? coarsen(texels, settings.block, 0, 0) : texels;
+    SearchMask mask = searchMask(cells);
+    const bool known = std::any_of(shape.orientations.begin(), shape.orientations.end(),
+                                   [&](const Orientation& o) { return o.mask.hash == mask.hash; });
+    if (turn == 0) {
+      shape.cells = cells.count();
+      // Texels grown by half the padding cannot overlap another shape's; blocks cannot as they are.
+      shape.room = settings.block > 1 ? shape.cells : inflate(texels, settings.padding / 2).count();
+    }
+    if (!known) shape.orientations.push_back({turn, std::move(mask)});
+  }
+}
+
+}  // namespace
+
+std::vector<GridShape> rasteriseShapes(std::span<const PackShape> sources) {
+  std::vector<GridShape> shapes(sources.size());
+  parallelFor(sources.size(), 16, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) rasterise(sources[i], shapes[i]);
+  });
+  return shapes;
+}
+
+void addOrientations(std::span<const PackShape> sources, const GridSettings& settings, std::vector<GridShape>& shapes) {
+  parallelFor(shapes.size(), 16, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i)
+      if (!shapes[i].texels.empty()) makeOrientations(sources[i].mayRotate, settings, shapes[i]);
+  });
+}
+
+Taken takenBy(const GridShape& shape, int quarterTurns, const GridSettings& settings) {
+  const Bitmap grown = inflate(turned(shape.texels, quarterTurns), settings.padding);
+  if (settings.block == 1) return {grown, settings.padding};
+  const int margin = (settings.padding + settings.block - 1) / settings.block;
+  const int origin = margin * settings.block - settings.padding;
+  return {coarsen(grown, settings.block, origin, origin), margin};
+}
+
+}  // namespace lumel

@@ -1,0 +1,136 @@
+#include "baker/bake_files.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <set>
+
+#include "baker/baked_scene.h"
+
+namespace lumel {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path scratch() {
+  const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+  const fs::path dir = fs::path(testing::TempDir()) / (std::string("lumel-files-") + info->name());
+  fs::remove_all(dir);
+  return dir;
+}
+
+/// A bake of nothing with so many pages of 8 x 4 texels, all covered, of one value.
+struct Fixture {
+  Scene scene;
+  AtlasResult atlas;
+  BakeResult result;
+  BakeRecord record;
+
+  explicit Fixture(int pages, float value = 0.5f) {
+    scene.materials.resize(1);
+    for (int i = 0; i < pages; ++i) {
+      BakedPage page;
+      for (Image& map : page.rnm) map = Image(8, 4, 3, value);
+      page.flat = Image(8, 4, 3, value);
+      page.aux = Image(8, 4, 4, 1.0f);
+      result.pages.push_back(page);
+      atlas.atlas.pages.push_back({8, 4});
+    }
+  }
+  Expected<void> write(const fs::path& dir) const { return writeBake(dir, scene, atlas, result, record); }
+};
+
+std::set<std::string> namesIn(const fs::path& dir) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(dir)) names.insert(entry.path().filename());
+  return names;
+}
+
+TEST(BakeFiles, SmallerBakeReplacesALargerOneAndLeavesOtherFilesAlone) {
+  const fs::path dir = scratch();
+  Fixture large(2);
+  large.scene.environment.image = Image(4, 2, 3, 1.0f);
+  ASSERT_TRUE(large.write(dir));
+  EXPECT_EQ(namesIn(dir).size(), 2u * 5u + 3u);  // images, sky.exr, scene.glb, bake.json
+  for (const char* foreign : {"notes.txt", "lightmap-x-rnm0.exr", "lightmap-1-rnm0.png"})
+    std::ofstream(dir / foreign) << "mine";
+  ASSERT_TRUE(Fixture(1).write(dir));
+  const auto names = namesIn(dir);
+  EXPECT_EQ(names, (std::set<std::string>{"bake.json", "scene.glb", "lightmap-0-rnm0.exr", "lightmap-0-rnm1.exr",
+                                          "lightmap-0-rnm2.exr", "lightmap-0-flat.exr", "lightmap-0-aux.exr",
+                                          "notes.txt", "lightmap-x-rnm0.exr", "lightmap-1-rnm0.png"}));
+}
+
+TEST(BakeFiles, FailureLeavesTheOldResult) {
+  const fs::path dir = scratch();
+  ASSERT_TRUE(Fixture(1).write(dir));
+  const auto before = fs::last_write_time(dir / "bake.json");
+  Fixture broken(1);
+  broken.record.half = true;
+  broken.result.pages[0].flat.pixels[5] = 1e6f;  // beyond what half holds
+  const auto written = broken.write(dir);
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().kind, ErrorKind::Failed);
+  EXPECT_NE(written.error().message.find("65504"), std::string::npos) << written.error().message;
+  EXPECT_EQ(fs::last_write_time(dir / "bake.json"), before);
+  EXPECT_EQ(namesIn(dir).size(), 7u);
+}
+
+TEST(BakeFiles, RemovesWhatAKilledBakeLeft) {
+  const fs::path dir = scratch();
+  fs::create_directories(dir / ".lumel-999999999.part");  // beyond the largest process number of Linux
+  fs::create_directories(dir / ".lumel-mine.part");
+  ASSERT_TRUE(Fixture(1).write(dir));
+  EXPECT_FALSE(fs::exists(dir / ".lumel-999999999.part"));
+  EXPECT_TRUE(fs::exists(dir / ".lumel-mine.part"));
+}
+
+TEST(BakeFiles, ReadBackIsWhatWasWritten) {
+  const fs::path dir = scratch();
+  Fixture fixture(2, 0.25f);
+  fixture.scene.environment.image = Image(4, 2, 3, 2.0f);
+  fixture.scene.environment.rotationDegrees = 30.0f;
+  fixture.scene.environment.strength = 0.5f;
+  ASSERT_TRUE(fixture.write(dir));
+  const auto baked = readBake(dir);
+  ASSERT_TRUE(baked) << baked.error().message;
+  ASSERT_EQ(baked->pages.size(), 2u);
+  EXPECT_EQ(baked->pages[1][2].pixels, fixture.result.pages[1].rnm[2].pixels);
+  EXPECT_EQ(baked->decode, RnmDecode::Squared);
+  EXPECT_EQ(baked->meanFlat, Vec3(0.25f));
+  EXPECT_EQ(baked->scene.environment.rotationDegrees, 30.0f);
+  EXPECT_EQ(baked->scene.environment.strength, 0.5f);
+  EXPECT_EQ(baked->scene.environment.image.pixels, fixture.scene.environment.image.pixels);
+}
+
+TEST(BakeFiles, DamagedResultsAreNamed) {
+  const fs::path dir = scratch();
+  const auto fails = [&](const std::string& word) {
+    const auto baked = readBake(dir);
+    return !baked && baked.error().kind == ErrorKind::Input && baked.error().message.find(word) != std::string::npos;
+  };
+  ASSERT_TRUE(Fixture(1).write(dir));
+  fs::remove(dir / "lightmap-0-rnm1.exr");
+  EXPECT_TRUE(fails("lightmap-0-rnm1.exr"));
+  std::ofstream(dir / "bake.json") << "{\"format\": 1}";
+  EXPECT_TRUE(fails("/conventions is missing"));
+  std::ofstream(dir / "bake.json") << "{\"format\": 99}";
+  EXPECT_TRUE(fails("format"));
+  std::ofstream(dir / "bake.json") << "{\"form";
+  EXPECT_TRUE(fails("not valid JSON"));
+}
+
+TEST(BakeFiles, CheckWritableLeavesNothing) {
+  const fs::path dir = scratch();
+  EXPECT_TRUE(checkWritable(dir / "a" / "b"));
+  EXPECT_FALSE(fs::exists(dir));
+  fs::create_directories(dir);
+  EXPECT_TRUE(checkWritable(dir));
+  EXPECT_TRUE(namesIn(dir).empty());
+  std::ofstream(dir / "file") << "x";
+  EXPECT_FALSE(checkWritable(dir / "file"));
+  EXPECT_FALSE(checkWritable(dir / "file" / "below"));
+}
+
+}  // namespace
+}  // namespace lumel

@@ -1,0 +1,240 @@
+// Direct light on a rectangle against closed forms, flat and all three raw RNM maps.
+#include <gtest/gtest.h>
+
+#include "scene/environment.h"
+#include "tests/baker/test_scene.h"
+
+namespace lumel {
+namespace {
+
+using namespace testing_scene;
+
+constexpr double kPiD = std::numbers::pi;
+
+struct Ground {
+  TestScene test;
+  int page = 0;
+  std::array<Vec3d, 4> axes;  // normal, B0, B1, B2
+
+  explicit Ground(int texels = 4) {
+    page = test.addRectangle({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, {.texels = texels});
+    for (int i = 0; i < 4; ++i) axes[static_cast<std::size_t>(i)] = axisInWorld(test, page, i - 1);
+  }
+  /// Light of irradiance `facing` on a facing surface from direction wi.
+  Maps fromDirection(const Vec3d& wi, double facing) const {
+    Maps m{};
+    for (std::size_t i = 0; i < 4; ++i) m[i] = facing / kPiD * std::max(0.0, glm::dot(wi, axes[i]));
+    return m;
+  }
+  Maps fromPolygon(const Vec3d& p, const std::vector<Vec3d>& corners) const {
+    Maps m{};
+    for (std::size_t i = 0; i < 4; ++i) m[i] = polygonLight(p, axes[0], axes[i], corners);
+    return m;
+  }
+};
+
+TEST(DirectLight, PolygonFormulaKnownValue) {
+  // A unit square at distance 1, seen from below its centre: 4/pi sqrt(1/5) atan(sqrt(1/5)) = 0.239456 (Howell B-4 /
+  // F12 of a differential element, four quarters).
+  const double quarter = 0.5 / std::sqrt(1.25);
+  const double form = 4 / (2 * kPiD) * (2 * quarter * std::atan(quarter));
+  EXPECT_NEAR(polygonLight({0, 0, 0}, {0, 1, 0}, {0, 1, 0}, {{-.5, 1, -.5}, {.5, 1, -.5}, {.5, 1, .5}, {-.5, 1, .5}}),
+              form, 1e-12);
+  EXPECT_NEAR(form, 0.239456, 1e-6);
+}
+
+TEST(DirectLight, PointLight) {
+  Ground ground;
+  Light light;
+  light.position = {0.7f, 1.3f, -0.4f};
+  light.intensity = 5.0f;
+  ground.test.scene.lights = {light};
+  expectAgreement(deviation(ground.test, {.samples = 64, .bounces = 0}, ground.page, [&](const Vec3d& p) {
+    const Vec3d d = Vec3d(light.position) - p;
+    return ground.fromDirection(glm::normalize(d), 5.0 / glm::dot(d, d));
+  }));
+}
+
+TEST(DirectLight, PointLightRange) {
+  Ground ground;
+  Light light;
+  light.position = {0, 1, 0};
+  light.range = 1.5f;
+  ground.test.scene.lights = {light};
+  expectAgreement(deviation(ground.test, {.samples = 64, .bounces = 0}, ground.page, [&](const Vec3d& p) {
+    const Vec3d d = Vec3d(0, 1, 0) - p;
+    const double window = std::clamp(1 - std::pow(glm::length(d) / 1.5, 4), 0.0, 1.0);
+    return ground.fromDirection(glm::normalize(d), window / glm::dot(d, d));
+  }));
+}
+
+TEST(DirectLight, SpotLight) {
+  Ground ground(8);
+  Light light;
+  light.type = LightType::Spot;
+  light.position = {0.2f, 2.0f, 0.1f};
+  light.direction = glm::normalize(Vec3(0.1f, -1.0f, 0.05f));
+  light.innerConeAngle = 0.2f;
+  light.outerConeAngle = 0.4f;
+  light.intensity = 7.0f;
+  ground.test.scene.lights = {light};
+  expectAgreement(deviation(ground.test, {.samples = 256, .bounces = 0}, ground.page,
+                            [&](const Vec3d& p) {
+                              const Vec3d d = Vec3d(light.position) - p;
+                              const double cd = glm::dot(-glm::normalize(d), Vec3d(light.direction));
+                              // Straight from KHR_lights_punctual, "Inner and Outer Cone Angles".
+                              const double scale = 1 / std::max(0.001, std::cos(0.2) - std::cos(0.4));
+                              double cone = std::clamp(cd * scale - std::cos(0.4) * scale, 0.0, 1.0);
+                              cone *= cone;
+                              return ground.fromDirection(glm::normalize(d), 7 * cone / glm::dot(d, d));
+                            }),
+                  0.02);
+}
+
+TEST(DirectLight, Sun) {
+  Ground ground(2);
+  Light light;
+  light.type = LightType::Directional;
+  light.direction = glm::normalize(Vec3(-0.8f, -0.5f, 0.3f));
+  light.intensity = 3.0f;
+  ground.test.scene.lights = {light};
+  expectAgreement(deviation(ground.test, {.samples = 1, .bounces = 0}, ground.page,
+                            [&](const Vec3d&) { return ground.fromDirection(-Vec3d(light.direction), 3.0); }));
+}
+
+// Several lights: one shadow ray per sample chooses among them.
+TEST(DirectLight, ManyLightsSumUp) {
+  for (const int count : {5, 100}) {
+    Ground ground(2);
+    for (int i = 0; i < count; ++i) {
+      Light light;
+      light.position = {std::cos(static_cast<float>(i)), 1.0f + 0.01f * static_cast<float>(i),
+                        std::sin(static_cast<float>(i) * 1.3f)};
+      light.intensity = 1.0f + static_cast<float>(i % 7);
+      ground.test.scene.lights.push_back(light);
+    }
+    expectAgreement(deviation(ground.test, {.samples = 512, .bounces = 0}, ground.page, [&](const Vec3d& p) {
+      Maps sum{};
+      for (const Light& light : ground.test.scene.lights) {
+        const Vec3d d = Vec3d(light.position) - p;
+        const Maps one = ground.fromDirection(glm::normalize(d), static_cast<double>(light.intensity) / glm::dot(d, d));
+        for (std::size_t m = 0; m < 4; ++m) sum[m] += one[m];
+      }
+      return sum;
+    }));
+  }
+}
+
+// One quarter of the rectangle lies below the horizon of B1 or B2 at some texels: the clipping is exercised.
+TEST(DirectLight, RectangleLight) {
+  Ground ground;
+  const int lamp = ground.test.addMaterial(Vec3(0.0f), Vec3(2.0f));
+  ground.test.addRectangle({0.2f, 0.9f, -1.5f}, {2, 0, 0}, {0, 0, 2}, {.material = lamp, .texels = 0});
+  const std::vector<Vec3d> corners = {{0.2, 0.9, -1.5}, {2.2, 0.9, -1.5}, {2.2, 0.9, 0.5}, {0.2, 0.9, 0.5}};
+  expectAgreement(deviation(ground.test, {.samples = 256, .bounces = 0}, ground.page, [&](const Vec3d& p) {
+    Maps m = ground.fromPolygon(p, corners);
+    for (double& v : m) v *= 2;
+    return m;
+  }));
+}
+
+// A lamp that touches the receiver's plane: near-singular for area sampling, met by multiple importance sampling.
+TEST(DirectLight, LampThatTouchesTheGround) {
+  Ground ground;
+  const int lamp = ground.test.addMaterial(Vec3(0.0f), Vec3(1.0f));
+  ground.test.addRectangle({-1, 0, -1}, {2, 0, 0}, {0, 2, 0}, {.material = lamp, .texels = 0});
+  const std::vector<Vec3d> corners = {{-1, 0, -1}, {1, 0, -1}, {1, 2, -1}, {-1, 2, -1}};
+  expectAgreement(deviation(ground.test, {.samples = 256, .bounces = 0}, ground.page,
+                            [&](const Vec3d& p) { return ground.fromPolygon(p, corners); }),
+                  0.02);
+}
+
+TEST(DirectLight, LampShinesFromItsFrontUnlessDoubleSided) {
+  for (const bool doubleSided : {false, true})
+    for (const bool flip : {false, true}) {
+      Ground ground(2);
+      const int lamp = ground.test.addMaterial(Vec3(0.0f), Vec3(1.0f));
+      ground.test.scene.materials[static_cast<std::size_t>(lamp)].doubleSided = doubleSided;
+      ground.test.addRectangle({-1, 1, 1}, {2, 0, 0}, {0, 0, -2},
+                               {.material = lamp, .texels = 0, .flip = flip});  // faces up
+      const BakeResult result = ground.test.bake({.samples = 64, .bounces = 2});
+      EXPECT_EQ(result.pages[0].flat.rgb(0, 0).x > 0.01f, doubleSided) << "mirrored: " << flip;
+    }
+}
+
+// Only the right half of the lamp shines: the texture's columns are black and white.
+TEST(DirectLight, TexturedLamp) {
+  Ground ground;
+  const int lamp = ground.test.addMaterial(Vec3(0.0f), Vec3(3.0f));
+  Material& material = ground.test.scene.materials[static_cast<std::size_t>(lamp)];
+  material.emissionMap.image = ground.test.addImage(2, 1, {{0, 0, 0, 1}, {1, 1, 1, 1}});
+  material.emissionMap.nearest = true;
+  ground.test.addRectangle({-1, 1, -1}, {2, 0, 0}, {0, 0, 2}, {.material = lamp, .texels = 0});
+  const std::vector<Vec3d> corners = {{0, 1, -1}, {1, 1, -1}, {1, 1, 1}, {0, 1, 1}};
+  expectAgreement(deviation(ground.test, {.samples = 256, .bounces = 0}, ground.page,
+                            [&](const Vec3d& p) {
+                              Maps m = ground.fromPolygon(p, corners);
+                              for (double& v : m) v *= 3;
+                              return m;
+                            }),
+                  0.02);
+}
+
+TEST(DirectLight, UniformSky) {
+  Ground ground(2);
+  ground.test.scene.environment.color = Vec3(1.0f);
+  const double tilted = (1 + 1 / std::sqrt(3.0)) / 2;  // 0.788675, DESIGN section 3
+  expectAgreement(deviation(ground.test, {.samples = 256, .bounces = 0}, ground.page, [&](const Vec3d&) {
+    return Maps{1, tilted, tilted, tilted};
+  }));
+}
+
+// The same sky as an image: sampled by its table and by gather rays, joined by multiple importance sampling.
+TEST(DirectLight, UniformSkyAsAnImage) {
+  Ground ground(2);
+  ground.test.scene.environment.image = Image(16, 8, 3, 0.5f);
+  ground.test.scene.environment.strength = 2.0f;
+  const double tilted = (1 + 1 / std::sqrt(3.0)) / 2;
+  expectAgreement(deviation(ground.test, {.samples = 256, .bounces = 0}, ground.page, [&](const Vec3d&) {
+    return Maps{1, tilted, tilted, tilted};
+  }));
+}
+
+TEST(DirectLight, SkyWithABrightSpotAgainstNumericIntegration) {
+  for (const float rotation : {0.0f, 130.0f}) {
+    Ground ground(2);
+    Environment& sky = ground.test.scene.environment;
+    sky.image = Image(64, 32, 3, 0.0f);
+    sky.image.setRgb(20, 9, Vec3(1000.0f));
+    sky.image.setRgb(50, 3, Vec3(200.0f));
+    sky.rotationDegrees = rotation;
+    Maps truth{};
+    constexpr int kRows = 1024, kColumns = 2048;
+    for (int row = 0; row < kRows / 2; ++row)
+      for (int column = 0; column < kColumns; ++column) {
+        const double polar = kPiD * (row + 0.5) / kRows, azimuth = 2 * kPiD * (column + 0.5) / kColumns;
+        const Vec3d w(std::sin(polar) * std::cos(azimuth), std::cos(polar), std::sin(polar) * std::sin(azimuth));
+        const double solidAngle = std::sin(polar) * (kPiD / kRows) * (2 * kPiD / kColumns);
+        const Maps one = ground.fromDirection(w, static_cast<double>(environmentRadiance(sky, Vec3(w)).x) * solidAngle);
+        for (std::size_t m = 0; m < 4; ++m) truth[m] += one[m];
+      }
+    Deviation d =
+        deviation(ground.test, {.samples = 1024, .bounces = 0}, ground.page, [&](const Vec3d&) { return truth; });
+    // The numeric integral itself is good to about 1e-4 (midpoints of a bilinear image, 32 per pixel).
+    for (std::size_t m = 0; m < 4; ++m) d.standardError[m] += 0.25e-4 * d.expected[m];
+    expectAgreement(d);
+  }
+}
+
+TEST(DirectLight, NoLightsIsBlackAndCheap) {
+  Ground ground;
+  ground.test.addRoom({-5, -1, -5}, {5, 5, 5});
+  const BakeResult result = ground.test.bake({.samples = 64, .bounces = 8});
+  for (const BakedPage& page : result.pages)
+    for (const float v : page.flat.pixels) ASSERT_EQ(v, 0.0f);
+  EXPECT_EQ(result.stats.shadowRays, 0u);
+  EXPECT_LE(result.stats.rays, 64u * result.stats.texels);
+}
+
+}  // namespace
+}  // namespace lumel

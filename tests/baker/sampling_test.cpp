@@ -1,0 +1,157 @@
+#include "baker/sampling.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <vector>
+
+#include "baker/distribution.h"
+#include "baker/sobol.h"
+#include "lightmap/rnm_basis.h"
+
+namespace lumel {
+namespace {
+
+struct HemisphereSampler {
+  const char* name;
+  Vec3 (*sample)(Vec2);
+  float (*pdf)(float);
+  Vec2 (*invert)(const Vec3&);
+};
+
+const HemisphereSampler kSamplers[] = {
+    {"cosine", sampleCosineHemisphere, cosineHemispherePdf, invertCosineHemisphere},
+    {"gather", sampleGatherHemisphere, gatherHemispherePdf, invertGatherHemisphere},
+};
+
+TEST(Sampling, HemisphereRoundTrips) {
+  for (const auto& s : kSamplers)
+    for (std::uint32_t i = 0; i < 4096; ++i) {
+      const Vec2 u = sobol2D(i, 1);
+      const Vec3 w = s.sample(u);
+      EXPECT_NEAR(glm::length(w), 1.0f, 2e-6f) << s.name;
+      ASSERT_GT(w.z, 0.0f) << s.name;
+      const Vec2 back = s.invert(w);
+      // Near the horizon and the pole the inverse loses digits of float: 1e-5 in x; in azimuth 1e-4 and around.
+      EXPECT_NEAR(back.x, u.x, 1e-5f) << s.name;
+      const float turn = std::abs(back.y - u.y);
+      if (w.z < 0.999f) {
+        EXPECT_LT(std::min(turn, 1.0f - turn), 1e-4f) << s.name;
+      }
+    }
+}
+
+TEST(Sampling, HemispherePdfsIntegrateToOne) {
+  for (const auto& s : kSamplers) {
+    double sum = 0;  // over z by midpoints: Integral 2 pi p(z) dz
+    for (int i = 0; i < 1000; ++i)
+      sum += 2 * std::numbers::pi * static_cast<double>(s.pdf((static_cast<float>(i) + 0.5f) / 1000)) / 1000;
+    EXPECT_NEAR(sum, 1.0, 1e-5) << s.name;
+    EXPECT_EQ(s.pdf(0.0f), 0.0f);
+    EXPECT_EQ(s.pdf(-0.5f), 0.0f);
+  }
+}
+
+// Counts per cell of (z, azimuth) against the integral of the density over the cell; exact up to the cells' borders
+// because the points are a net.
+TEST(Sampling, HemisphereHistogramsMatchTheirPdf) {
+  constexpr int kZ = 8, kTurn = 8, kSamples = 1 << 16;
+  for (const auto& s : kSamplers) {
+    std::array<std::array<double, kTurn>, kZ> histogram{};
+    for (std::uint32_t i = 0; i < kSamples; ++i) {
+      const Vec3 w = s.sample(sobol2D(i, 9));
+      const auto z = static_cast<std::size_t>(std::min(kZ - 1.0f, w.z * kZ));
+      const auto turn = static_cast<std::size_t>(std::min(kTurn - 1.0f, turnOf(w) * kTurn));
+      histogram[z][turn] += 1.0 / kSamples;
+    }
+    for (int z = 0; z < kZ; ++z) {
+      double expected = 0;
+      for (int k = 0; k < 64; ++k)
+        expected += 2 * std::numbers::pi *
+                    static_cast<double>(s.pdf((static_cast<float>(z) + (static_cast<float>(k) + 0.5f) / 64) / kZ)) /
+                    (64.0 * kZ * kTurn);
+      for (int t = 0; t < kTurn; ++t)
+        EXPECT_NEAR(histogram[static_cast<std::size_t>(z)][static_cast<std::size_t>(t)], expected, 4e-4)
+            << s.name << " z " << z << " turn " << t;
+    }
+  }
+}
+
+TEST(Sampling, GatherWeightsAreBoundedForEveryBasisVector) {
+  float mostFlat = 0, mostTilted = 0;
+  for (std::uint32_t i = 0; i < 65536; ++i) {
+    const Vec3 w = sampleGatherHemisphere(sobol2D(i, 3));
+    const float pdf = gatherHemispherePdf(w.z);
+    mostFlat = std::max(mostFlat, w.z * kInvPi / pdf);
+    for (const Vec3& basis : kRnmBasis) mostTilted = std::max(mostTilted, glm::dot(w, basis) * kInvPi / pdf);
+  }
+  EXPECT_LE(mostFlat, 4.0f / 3 + 1e-5f);
+  EXPECT_LE(mostTilted, 4 * std::sqrt(2.0f / 3) + 1e-5f);
+}
+
+TEST(Sampling, TriangleRoundTripsAndIsUniform) {
+  double x = 0, y = 0;
+  for (std::uint32_t i = 0; i < 4096; ++i) {
+    const Vec2 u = sobol2D(i, 5);
+    const Vec2 b = sampleTriangle(u);
+    ASSERT_GE(b.x, 0.0f);
+    ASSERT_GE(b.y, 0.0f);
+    ASSERT_LE(b.x + b.y, 1.0f);
+    const Vec2 back = invertTriangle(b);
+    EXPECT_NEAR(back.x, u.x, 1e-6f);
+    if (u.x > 1e-4f) {
+      EXPECT_NEAR(back.y, u.y, 1e-4f);
+    }
+    x += static_cast<double>(b.x);
+    y += static_cast<double>(b.y);
+  }
+  EXPECT_NEAR(x / 4096, 1.0 / 3, 1e-3);
+  EXPECT_NEAR(y / 4096, 1.0 / 3, 1e-3);
+}
+
+TEST(Sampling, MisWeightsOfTwoTechniquesSumToOne) {
+  EXPECT_FLOAT_EQ(misWeight(2, 3) + misWeight(3, 2), 1.0f);
+  EXPECT_EQ(misWeight(1, 0), 1.0f);
+  EXPECT_EQ(misWeight(1, std::numeric_limits<float>::infinity()), 0.0f);
+}
+
+TEST(Distribution, ProbabilityIsExactlyTheShareOfChoices) {
+  const std::vector<float> weights = {0.0f, 3.0f, 1e-12f, 0.0f, 5.0f, 2.0f, 0.0f};
+  const Distribution d(weights);
+  ASSERT_EQ(d.size(), weights.size());
+  float sum = 0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    sum += d.probability(i);
+    EXPECT_EQ(d.probability(i) > 0, weights[i] > 0) << i;
+  }
+  EXPECT_EQ(sum, 1.0f);
+  EXPECT_NEAR(d.probability(1), 0.3f, 1e-6f);
+  std::vector<std::uint32_t> counts(weights.size());
+  for (std::uint32_t k = 0; k < (1u << 24); ++k) ++counts[d.choose(static_cast<float>(k) * 0x1p-24f)];
+  for (std::size_t i = 0; i < weights.size(); ++i)
+    EXPECT_EQ(static_cast<float>(counts[i]) * 0x1p-24f, d.probability(i)) << i;
+}
+
+TEST(Distribution, RestReusesTheNumber) {
+  const std::vector<float> weights = {1.0f, 3.0f};
+  const Distribution d(weights);
+  EXPECT_EQ(d.choose(0.1f), 0u);
+  EXPECT_NEAR(d.rest(0.125f, 0), 0.5f, 1e-6f);
+  EXPECT_EQ(d.choose(0.9f), 1u);
+  EXPECT_NEAR(d.rest(0.625f, 1), 0.5f, 1e-6f);
+  EXPECT_LT(d.rest(0x1.fffffep-1f, 1), 1.0f);
+}
+
+TEST(Distribution, DegenerateWeights) {
+  EXPECT_TRUE(Distribution().empty());
+  EXPECT_TRUE(Distribution(std::vector<float>{}).empty());
+  EXPECT_TRUE(Distribution(std::vector<float>{0, 0}).empty());
+  EXPECT_TRUE(Distribution(std::vector<float>{-1, std::nanf("")}).empty());
+  const Distribution one(std::vector<float>{std::nanf(""), 2.0f});
+  EXPECT_EQ(one.choose(0.0f), 1u);
+  EXPECT_EQ(one.choose(0x1.fffffep-1f), 1u);
+  EXPECT_EQ(one.probability(1), 1.0f);
+}
+
+}  // namespace
+}  // namespace lumel

@@ -1,0 +1,157 @@
+// What a user meets who makes a mistake: an exit code for scripts and one line that says what, where and what to do.
+#include <gtest/gtest.h>
+
+#include "tests/cli/harness.h"
+
+namespace lumel::cli {
+namespace {
+
+using testing::AssertionFailure;
+using testing::AssertionResult;
+using testing::AssertionSuccess;
+
+/// The code, one line on standard error that starts with "lumel: " and holds the words, nothing on standard output.
+AssertionResult fails(const Outcome& outcome, int exitCode, const std::vector<std::string>& words) {
+  if (outcome.exitCode != exitCode)
+    return AssertionFailure() << "exit code " << outcome.exitCode << ": " << outcome.err;
+  const std::size_t start = outcome.err.rfind("lumel: ");
+  if (start == std::string::npos || (start > 0 && outcome.err[start - 1] != '\n') || outcome.err.back() != '\n' ||
+      outcome.err.find('\n', start) != outcome.err.size() - 1)
+    return AssertionFailure() << "not one line at the end: " << outcome.err;
+  for (const std::string& word : words)
+    if (outcome.err.find(word, start) == std::string::npos)
+      return AssertionFailure() << "no '" << word << "' in: " << outcome.err;
+  if (!outcome.out.empty()) return AssertionFailure() << "on standard output: " << outcome.out;
+  return AssertionSuccess();
+}
+
+std::string floorScene(const std::filesystem::path& dir) {
+  writeFile(dir / "floor.gltf", gltfOf({floorQuad()}).dump());
+  return dir / "floor.gltf";
+}
+
+TEST(ExitCodes, HelpAndVersionSucceedOnStandardOutput) {
+  const Outcome version = run({"--version"});
+  EXPECT_EQ(version.exitCode, 0);
+  EXPECT_EQ(version.out.rfind("lumel ", 0), 0u) << version.out;
+  for (const char* command : {"bake", "render", "info", "diff"}) {
+    const Outcome help = run({command, "--help"});
+    EXPECT_EQ(help.exitCode, 0);
+    EXPECT_NE(help.out.find("Usage: lumel " + std::string(command)), std::string::npos);
+    EXPECT_NE(help.out.find("Example"), std::string::npos);
+    EXPECT_EQ(help.err, "");
+  }
+  // Defaults are shown.
+  EXPECT_NE(run({"bake", "--help"}).out.find("Gather rays per texel [256]"), std::string::npos);
+}
+
+TEST(ExitCodes, WrongCommandLineIs2) {
+  const std::string scene = floorScene(scratch());
+  const std::string out = scratch() / "out";
+  EXPECT_TRUE(fails(run({}), 2, {"--help"}));
+  EXPECT_TRUE(fails(run({"frobnicate"}), 2, {"frobnicate"}));
+  EXPECT_TRUE(fails(run({"bake"}), 2, {"SCENE is missing"}));
+  EXPECT_TRUE(fails(run({"bake", scene}), 2, {"--output", "missing"}));
+  const auto bake = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"bake", scene, "-o", out});
+    return run(more);
+  };
+  EXPECT_TRUE(fails(bake({"--smaples", "3"}), 2, {"--smaples", "did you mean --samples?"}));
+  EXPECT_TRUE(fails(bake({"--samples", "0"}), 2, {"--samples", "0", "use 1"}));
+  EXPECT_TRUE(fails(bake({"--samples", "many"}), 2, {"--samples", "'many'", "number"}));
+  EXPECT_TRUE(fails(bake({"--samples", "99999999999"}), 2, {"--samples", "too large"}));
+  EXPECT_TRUE(fails(bake({"--samples"}), 2, {"--samples"}));
+  EXPECT_TRUE(fails(bake({"--padding", "-1"}), 2, {"--padding", "-1"}));
+  EXPECT_TRUE(fails(bake({"--sky-strength", "nan"}), 2, {"--sky-strength", "finite"}));
+  EXPECT_TRUE(fails(bake({"--sky-color", "1", "2"}), 2, {"--sky-color", "3"}));
+  EXPECT_TRUE(fails(bake({"--sky-color", "1", "-2", "0"}), 2, {"--sky-color", "-2"}));
+  EXPECT_TRUE(fails(bake({"--page-size", "30"}), 2, {"--page-size", "multiple of 4"}));
+  EXPECT_TRUE(fails(bake({"--projection", "round"}), 2, {"--projection", "raw|flat|fit"}));
+  EXPECT_TRUE(fails(bake({"--sky", "x.hdr", "--sky-color", "1", "1", "1"}), 2, {"--sky-color"}));
+  EXPECT_TRUE(fails(run({"render", out, "-o", "still.bmp"}), 2, {"still.bmp", ".png"}));
+  EXPECT_FALSE(std::filesystem::exists(out));
+}
+
+TEST(ExitCodes, WrongInputIs3) {
+  const auto dir = scratch();
+  const std::string out = dir / "out";
+  EXPECT_TRUE(fails(run({"bake", dir / "none.gltf", "-o", out}), 3, {"none.gltf"}));
+  writeFile(dir / "broken.gltf", "{\"asset\":");
+  EXPECT_TRUE(fails(run({"bake", dir / "broken.gltf", "-o", out}), 3, {"broken.gltf"}));
+  nlohmann::json unknown = gltfOf({floorQuad()});
+  unknown["extensionsUsed"] = unknown["extensionsRequired"] = {"EXT_from_the_future"};
+  writeFile(dir / "future.gltf", unknown.dump());
+  EXPECT_TRUE(fails(run({"bake", dir / "future.gltf", "-o", out}), 3, {"future.gltf", "EXT_from_the_future"}));
+  EXPECT_TRUE(fails(run({"bake", floorScene(dir), "-o", out, "--sky", dir / "none.hdr"}), 3, {"none.hdr"}));
+  EXPECT_FALSE(std::filesystem::exists(out));
+  EXPECT_TRUE(fails(run({"render", dir, "-o", dir / "still.png"}), 3, {"bake.json"}));
+  EXPECT_TRUE(fails(run({"info", dir / "none.exr"}), 3, {"none.exr"}));
+  EXPECT_TRUE(fails(run({"diff", dir / "none.exr", dir / "none.exr"}), 3, {"none.exr"}));
+}
+
+TEST(ExitCodes, OutputThatCannotBeWrittenIs1BeforeTheWork) {
+  const auto dir = scratch();
+  const std::string scene = floorScene(dir);
+  // A file stands where the folder should be; so many samples would take hours.
+  const Outcome outcome =
+      run({"bake", scene, "-o", scene + "/out", "--samples", "1000000", "--sky-color", "1", "1", "1"});
+  EXPECT_TRUE(fails(outcome, 1, {"floor.gltf/out", "cannot be written"}));
+}
+
+TEST(Config, CommandLineWinsOverConfigOverDefaults) {
+  const auto dir = scratch();
+  floorScene(dir);
+  std::filesystem::create_directory(dir / "settings");
+  // Paths are relative to the file, tables of other commands are left alone, a table of this one counts.
+  writeFile(dir / "settings" / "bake.toml",
+            "scene = \"../floor.gltf\"\nsamples = 3\nsky-color = [1, 0.5, 0]\n[bake]\nseed = 7\n[render]\nspp = 4\n");
+  const Outcome outcome = run(
+      {"bake", "--config", dir / "settings" / "bake.toml", "-o", dir / "out", "--samples", "5", "--page-size", "64"});
+  ASSERT_EQ(outcome.exitCode, 0) << outcome.err;
+  const auto settings = readJson(dir / "out" / "bake.json")["settings"];
+  EXPECT_EQ(settings["samples"], 5);
+  EXPECT_EQ(settings["seed"], 7);
+  EXPECT_EQ(settings["sky-color"], nlohmann::json({1.0, 0.5, 0.0}));
+  EXPECT_EQ(settings["bounces"], 4);
+}
+
+TEST(Config, MistakesAre2WithFileAndLine) {
+  const auto dir = scratch();
+  const std::string scene = floorScene(dir);
+  const auto bakeWith = [&](const std::string& toml) {
+    writeFile(dir / "bake.toml", toml);
+    return run({"bake", scene, "-o", dir / "out", "--config", dir / "bake.toml"});
+  };
+  EXPECT_TRUE(fails(bakeWith("seed = 1\nsampels = 3\n"), 2, {"bake.toml:2:", "sampels", "did you mean 'samples'?"}));
+  EXPECT_TRUE(fails(bakeWith("\n\nsamples = 0\n"), 2, {"bake.toml:3:", "samples", "use 1"}));
+  EXPECT_TRUE(fails(bakeWith("sky-color = [1, 2]\n"), 2, {"bake.toml:1:", "3 values"}));
+  EXPECT_TRUE(fails(bakeWith("samples = 1.5\n"), 2, {"bake.toml:1:", "1.5"}));
+  EXPECT_TRUE(fails(bakeWith("samples == 3\n"), 2, {"bake.toml:1:"}));
+  EXPECT_TRUE(fails(bakeWith("[bake]\nseed = nan\n"), 2, {"bake.toml:2:", "seed"}));
+  EXPECT_TRUE(fails(run({"bake", scene, "-o", dir / "out", "--config", dir / "none.toml"}), 2, {"none.toml"}));
+  EXPECT_FALSE(std::filesystem::exists(dir / "out"));
+}
+
+TEST(Info, DescribesScenesImagesAndBakes) {
+  const auto dir = scratch();
+  const std::string scene = floorScene(dir);
+  const Outcome outcome = run({"info", scene, "--json", "--texels-per-meter", "10"});
+  ASSERT_EQ(outcome.exitCode, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out, nullptr, false);
+  EXPECT_EQ(json["kind"], "scene");
+  EXPECT_EQ(json["triangles"], 2);
+  EXPECT_EQ(json["materials"].size(), 1u);
+  EXPECT_EQ(json["estimate"]["texels"], 400);  // 2 m x 2 m
+  ASSERT_EQ(run({"bake", scene, "-o", dir / "out", "--samples", "1", "--page-size", "16", "--sky-color", "1", "1", "1"})
+                .exitCode,
+            0);
+  EXPECT_NE(run({"info", dir / "out"}).out.find("decode: squared"), std::string::npos);
+  const auto image =
+      nlohmann::json::parse(run({"info", dir / "out" / "lightmap-0-aux.exr", "--json"}).out, nullptr, false);
+  EXPECT_EQ(image["width"], 16);
+  EXPECT_EQ(image["channels"]["samples"]["max"], 1.0);
+  EXPECT_EQ(image["metadata"]["lumel:map"], "aux");
+}
+
+}  // namespace
+}  // namespace lumel::cli

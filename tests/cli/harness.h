@@ -1,0 +1,59 @@
+// Runs the lumel binary as a user would, and makes small scenes for it.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "scene/math.h"
+
+namespace lumel::cli {
+
+struct Outcome {
+  int exitCode = -1;  // 128 + signal where one ended it
+  std::string out;
+  std::string err;
+};
+
+/// Runs `lumel ARGUMENTS...` with both outputs in pipes.
+Outcome run(const std::vector<std::string>& arguments);
+
+/// The same with all output on a terminal; `out` holds what the terminal got.
+Outcome runOnTerminal(const std::vector<std::string>& arguments);
+
+/// Starts it, sends SIGINT once its standard error holds `sign`, and waits for the end.
+Outcome runAndInterrupt(const std::vector<std::string>& arguments, const std::string& sign);
+
+/// An empty folder of the running test.
+std::filesystem::path scratch();
+
+std::string readFile(const std::filesystem::path& file);
+void writeFile(const std::filesystem::path& file, const std::string& content);
+nlohmann::json readJson(const std::filesystem::path& file);
+
+/// Name and content of every file in a folder, hidden ones too.
+std::map<std::string, std::string> readFolder(const std::filesystem::path& dir);
+
+/// A quad for a glTF file: corners counter-clockwise, TEXCOORD_1 (and 0) spanning a rectangle of the page, the first
+/// corner at its top left, the second below it.
+struct Quad {
+  Vec3 corners[4];
+  Vec2 uvLeast{0, 0};
+  Vec2 uvMost{1, 1};
+};
+
+/// A glTF document of one node with one material, to be changed by the test before it is written.
+nlohmann::json gltfOf(const std::vector<Quad>& quads);
+
+/// A closed box of 2 m seen from inside, each side in its own sixth of the page.
+std::vector<Quad> boxFromInside();
+
+/// A floor of 2 m around the origin, face up, over the whole page.
+Quad floorQuad();
+
+/// Adds a camera 3 m above the origin that looks straight down at `halfExtent` metres to each side.
+void addCameraAbove(nlohmann::json& gltf, float halfExtent);
+
+}  // namespace lumel::cli

@@ -1,0 +1,214 @@
+// Every wrong file gives one line that names file, place, problem and what to do; none crashes.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+#include "scene/load_scene.h"
+#include "tests/scene/gltf_builder.h"
+
+namespace lumel {
+namespace {
+
+using Json = nlohmann::json;
+namespace fs = std::filesystem;
+
+std::string errorOf(const Expected<Scene>& result) {
+  if (result) return "(it loads)";
+  EXPECT_EQ(result.error().kind, ErrorKind::Input) << result.error().message;
+  EXPECT_EQ(result.error().message.find('\n'), std::string::npos);
+  return result.error().message;
+}
+
+/// What loading the unit square says after `change`.
+std::string broken(const std::function<void(GltfBuilder&)>& change) {
+  GltfBuilder g;
+  g.square();
+  change(g);
+  return errorOf(g.load());
+}
+
+std::string textError(const std::string& text) {
+  return errorOf(loadGltf({text.begin(), text.end()}, "test.gltf", "/nonexistent", {}));
+}
+
+TEST(GltfErrors, Container) {
+  GltfBuilder g;
+  g.square();
+  auto bytes = g.glb();
+  bytes.resize(bytes.size() - 8);
+  EXPECT_NE(errorOf(loadGltf(bytes, "cut.glb", "", {})).find("cut.glb: GLB container: a file of"), std::string::npos);
+  bytes.resize(10);
+  EXPECT_NE(errorOf(loadGltf(bytes, "cut.glb", "", {})).find("the header is cut off at 10 bytes"), std::string::npos);
+  auto old = g.glb();
+  old[4] = 1;
+  EXPECT_EQ(errorOf(loadGltf(old, "old.glb", "", {})), "old.glb: GLB container: version 1 is not 2; convert the file to glTF 2.0");
+  EXPECT_NE(errorOf(loadGltf({}, "empty.gltf", "", {})).find("empty.gltf: JSON: "), std::string::npos);
+}
+
+TEST(GltfErrors, Json) {
+  EXPECT_NE(textError("{\"asset\": {\"version\": \"2.0\"}, }").find("test.gltf: JSON: parse error at line 1, column 3"), std::string::npos);
+  EXPECT_NE(textError("[]").find("asset/version: is missing"), std::string::npos);
+  EXPECT_EQ(textError("{\"asset\": {\"version\": \"1.0\"}}"), "test.gltf: asset/version: '1.0' is not 2.x; convert the file to glTF 2.0");
+  EXPECT_EQ(textError("{\"asset\": {\"version\": \"2.1\", \"minVersion\": \"2.1\"}}"),
+            "test.gltf: asset/minVersion: '2.1' asks for more than glTF 2.0; export as 2.0");
+  std::string deep = "{\"asset\": {\"version\": \"2.0\"}, \"extras\": ";
+  deep += std::string(100000, '[') + std::string(100000, ']') + "}";
+  EXPECT_EQ(textError(deep), "test.gltf: JSON: nested deeper than 128 levels");
+}
+
+TEST(GltfErrors, RequiredExtensionsAreNamed) {
+  EXPECT_EQ(broken([](auto& g) { g.json["extensionsRequired"] = {"KHR_texture_transform", "ACME_teapots"}; }),
+            "test.glb: extensionsRequired: 'ACME_teapots' is not supported; export without it");
+  EXPECT_EQ(broken([](auto& g) { g.json["extensionsUsed"] = {"ACME_teapots", "KHR_materials_variants"}; }), "(it loads)");
+}
+
+TEST(GltfErrors, IndicesOutOfRangeInTheJson) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"/meshes/0/primitives/0/attributes/POSITION", "accessors"}, {"/meshes/0/primitives/0/indices", "accessors"},
+      {"/meshes/0/primitives/0/material", "materials"},            {"/accessors/0/bufferView", "bufferViews"},
+      {"/bufferViews/0/buffer", "buffers"},                        {"/nodes/0/mesh", "meshes"},
+      {"/nodes/0/children/0", "nodes"},                            {"/nodes/0/camera", "cameras"},
+      {"/nodes/0/skin", "skins"},                                  {"/scene", "scenes"}};
+  for (const auto& [pointer, array] : cases)
+    for (const Json& value : {Json(99), Json(-1)}) {
+      const std::string expected = std::string("test.glb: ") + (pointer + 1) + ": is " + value.dump() + ", but there are ";
+      EXPECT_EQ(broken([&, p = pointer](auto& g) { g.json[Json::json_pointer(p)] = value; }).substr(0, expected.size()), expected)
+          << array;
+    }
+  EXPECT_EQ(broken([](auto& g) { g.json["accessors"][0]["count"] = -4; }),
+            "test.glb: accessors/0/count: must be a whole number, not negative");
+  EXPECT_EQ(broken([](auto& g) { g.json["nodes"][0]["scale"] = {1, 1}; }), "test.glb: nodes/0/scale: must have 3 numbers");
+  EXPECT_EQ(broken([](auto& g) { g.json["nodes"][0]["mesh"] = "wall"; }), "test.glb: nodes/0/mesh: must be an index into meshes");
+}
+
+TEST(GltfErrors, VertexIndexOutOfRange) {
+  EXPECT_EQ(broken([](auto& g) { g.json["meshes"][0]["primitives"][0]["indices"] = g.template accessor<std::uint16_t>("SCALAR", {0, 1, 2, 0, 2, 9}); }),
+            "test.glb: meshes/0/primitives/0/indices: entry 5 is 9, but there are 4 vertices; export again");
+}
+
+TEST(GltfErrors, AccessorsBeyondTheirBytes) {
+  EXPECT_NE(broken([](auto& g) { g.json["accessors"][0]["count"] = 5; }).find("test.glb: accessors/0: 5 elements from byte 0 on do not fit bufferViews/0, which has 48 bytes"), std::string::npos);
+  EXPECT_NE(broken([](auto& g) { g.json["accessors"][0]["count"] = std::uint64_t{1} << 62; }).find("test.glb: accessors/0: "), std::string::npos);
+  EXPECT_NE(broken([](auto& g) { g.json["accessors"][0]["byteOffset"] = (std::uint64_t{1} << 63) - 1; }).find("test.glb: accessors/0: "), std::string::npos);
+  EXPECT_NE(broken([](auto& g) { g.json["bufferViews"][0]["byteLength"] = 100000; }).find("test.glb: bufferViews/0: 100000 bytes from 0 on do not fit buffers/0"), std::string::npos);
+  EXPECT_NE(broken([](auto& g) { g.json["bufferViews"][0]["byteStride"] = 4; }).find("accessors/0: byteStride 4 is less than an element's 12 bytes"), std::string::npos);
+  EXPECT_NE(broken([](auto& g) {
+              g.json["accessors"][0].erase("bufferView");
+              g.json["accessors"][0]["count"] = std::uint64_t{1} << 40;
+            }).find("elements without a bufferView"), std::string::npos);
+  EXPECT_NE(broken([](auto& g) { g.json["accessors"][0]["type"] = "VEC2"; }).find("accessors/0: has 2 components where 3 are needed"), std::string::npos);
+  EXPECT_NE(broken([](auto& g) { g.json["accessors"][1]["count"] = 3; }).find("meshes/0/primitives/0/attributes/TEXCOORD_0: has 3 elements, but there are 4 vertices"), std::string::npos);
+}
+
+TEST(GltfErrors, SparseIndexOutOfRange) {
+  EXPECT_NE(broken([](auto& g) {
+              const std::uint8_t index[] = {4};
+              const float value[] = {1, 2, 3};
+              const int i = g.view(index, 1), v = g.view(value, 12);
+              g.json["accessors"][0]["sparse"] = {{"count", 1}, {"indices", {{"bufferView", i}, {"componentType", 5121}}}, {"values", {{"bufferView", v}}}};
+            }).find("accessors/0/sparse/indices: entry 0 is 4, but the accessor has 4 elements"), std::string::npos);
+}
+
+TEST(GltfErrors, PositionsThatAreNotFinite) {
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()})
+    EXPECT_EQ(broken([&](auto& g) { g.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = g.template accessor<float>("VEC3", {0, 0, 0, 1, 0, 0, 1, bad, 0, 0, 1, 0}); }),
+              "test.glb: meshes/0/primitives/0/attributes/POSITION: vertex 2 is not finite; repair the mesh and export again");
+}
+
+TEST(GltfErrors, NodeCyclesAndSharedChildren) {
+  EXPECT_EQ(broken([](auto& g) { g.json["nodes"] = {{{"children", {1}}}, {{"children", {0}}, {"mesh", 0}}}; }),
+            "test.glb: nodes/0: is its own ancestor; correct the node tree");
+  EXPECT_EQ(broken([](auto& g) { g.json["nodes"] = {{{"children", {0}}}}; }), "test.glb: nodes/0: is its own ancestor; correct the node tree");
+  EXPECT_EQ(broken([](auto& g) { g.json["nodes"] = {{{"children", {2}}}, {{"children", {2}}}, {{"mesh", 0}}}; }),
+            "test.glb: nodes/1/children/0: node 2 is already a child of node 0; a node has one parent");
+}
+
+TEST(GltfErrors, TransformsThatOverflow) {
+  EXPECT_NE(broken([](auto& g) { g.json["nodes"] = {{{"scale", {1e15, 1, 1}}, {"children", {1}}}, {{"scale", {1e15, 1, 1}}, {"mesh", 0}}}; })
+                .find("test.glb: nodes/1: its transform reaches beyond 1e18 m"), std::string::npos);
+}
+
+class GltfFiles : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(testing::TempDir()) / (std::string("lumel-gltf-") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_ / "scene");
+    builder_.square();
+  }
+  void write(const fs::path& file, const std::string& text) {
+    std::ofstream(file, std::ios::binary).write(text.data(), static_cast<std::streamsize>(text.size()));
+  }
+  std::string binText() const { return {builder_.bin.begin(), builder_.bin.end()}; }
+  /// Writes scene/level.gltf with this buffer uri and loads it.
+  Expected<Scene> loadWith(const std::string& uri, const LoadOptions& options = {}) {
+    builder_.json["buffers"] = {{{"uri", uri}, {"byteLength", builder_.bin.size()}}};
+    write(folder_ / "scene" / "level.gltf", builder_.json.dump());
+    return loadScene(folder_ / "scene" / "level.gltf", options);
+  }
+  fs::path folder_;
+  GltfBuilder builder_;
+};
+
+TEST_F(GltfFiles, ExternalBuffersWithEscapedAndUnicodeNames) {
+  write(folder_ / "scene" / "my bu\xE2\x9D\xA4.bin", binText());
+  EXPECT_EQ(errorOf(loadWith("my%20bu\xE2\x9D\xA4.bin")), "(it loads)");
+}
+
+TEST_F(GltfFiles, MissingAndShortBuffers) {
+  EXPECT_NE(errorOf(loadWith("gone.bin")).find("gone.bin: no such file; put the buffer beside the scene file"), std::string::npos);
+  write(folder_ / "scene" / "short.bin", binText().substr(0, 40));
+  EXPECT_NE(errorOf(loadWith("short.bin")).find("buffers/0: has 40 of its "), std::string::npos);
+  EXPECT_NE(errorOf(loadWith("data:application/octet-stream;base64,!!!")).find("buffers/0/uri: is a data URI with a character that is not base64"), std::string::npos);
+}
+
+TEST_F(GltfFiles, PathsStayInTheScenesFolderUnlessAllowed) {
+  write(folder_ / "outside.bin", binText());
+  LoadOptions allow;
+  allow.allowOutsidePaths = true;
+  for (const std::string& uri : {std::string("../outside.bin"), (folder_ / "outside.bin").string(), std::string("x/../../outside.bin")}) {
+    EXPECT_NE(errorOf(loadWith(uri)).find("leaves the scene's folder"), std::string::npos) << uri;
+    EXPECT_EQ(errorOf(loadWith(uri, allow)), "(it loads)") << uri;
+  }
+  fs::create_symlink(folder_ / "outside.bin", folder_ / "scene" / "link.bin");
+  EXPECT_NE(errorOf(loadWith("link.bin")).find("leaves the scene's folder"), std::string::npos);
+  EXPECT_NE(errorOf(loadWith("file:///etc/passwd", allow)).find("is not a relative path"), std::string::npos);
+  fs::create_directories(folder_ / "scene" / "sub");
+  write(folder_ / "scene" / "sub" / "in.bin", binText());
+  EXPECT_EQ(errorOf(loadWith("sub/../sub/in.bin")), "(it loads)");
+}
+
+TEST_F(GltfFiles, WrongExtensionAndMissingFile) {
+  EXPECT_NE(errorOf(loadScene(folder_ / "level.fbx")).find("level.fbx: is not a scene file that can be read; use .gltf, .glb or .obj"), std::string::npos);
+  EXPECT_NE(errorOf(loadScene(folder_ / "level.glb")).find("level.glb: no such file"), std::string::npos);
+  EXPECT_NE(errorOf(loadScene(folder_ / "scene.glb")).find("no such file"), std::string::npos);
+  fs::create_directories(folder_ / "dir.glb");
+  EXPECT_NE(errorOf(loadScene(folder_ / "dir.glb")).find("is not a file"), std::string::npos);
+}
+
+TEST_F(GltfFiles, MissingTexturesAreWarningsAndOutsideOnesErrors) {
+  write(folder_ / "scene" / "b.bin", binText());
+  builder_.json["meshes"][0]["primitives"][0]["material"] = 0;
+  builder_.json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"baseColorFactor", {0.5, 0.25, 0.125, 1}}}}}};
+  builder_.json["textures"] = {{{"source", 0}}};
+  builder_.json["images"] = {{{"uri", "gone.png"}}};
+  auto scene = loadWith("b.bin");
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->report.warnings.size(), 1u);
+  EXPECT_NE(scene->report.warnings[0].find("images/0: "), std::string::npos);
+  EXPECT_NE(scene->report.warnings[0].find("gone.png: no such file"), std::string::npos);
+  EXPECT_TRUE(scene->images[0].encoded.empty());
+  EXPECT_EQ(scene->materials[0].baseColor, Vec4(0.5f, 0.25f, 0.125f, 1));
+  write(folder_ / "scene" / "gone.png", "not a picture");
+  scene = loadWith("b.bin");
+  ASSERT_TRUE(scene);
+  EXPECT_EQ(scene->report.warnings.size(), 1u);
+  EXPECT_TRUE(scene->images[0].encoded.empty());
+  builder_.json["images"][0]["uri"] = "../gone.png";
+  EXPECT_NE(errorOf(loadWith("b.bin")).find("images/0/uri: '../gone.png' leaves the scene's folder"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace lumel

@@ -1,0 +1,152 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "scene/environment.h"
+#include "scene/image_io.h"
+#include "scene/texture.h"
+
+namespace lumel {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// 2 x 2, RGBA: 0 and 1 with alpha 0.2 above, 0.4 and 0.6 below, grey (as 8-bit fractions).
+ImageSource checker() {
+  Image image(2, 2, 4);
+  const float grey[] = {0.0f, 1.0f, 0.4f, 0.6f};
+  for (int i = 0; i < 4; ++i) {
+    image.setRgb(i % 2, i / 2, Vec3(grey[i]));
+    image.at(i % 2, i / 2)[3] = i == 1 ? 0.2f : 1.0f;
+  }
+  return {"checker", "image/png", *encodePng(image)};
+}
+
+Texture decoded(const ImageSource& source, ColorSpace space) {
+  auto texture = Texture::decode(source, space);
+  EXPECT_TRUE(texture) << texture.error().message;
+  return *std::move(texture);
+}
+
+TEST(Texture, SrgbDecodesColoursNotAlpha) {
+  const Texture srgb = decoded(checker(), ColorSpace::Srgb), linear = decoded(checker(), ColorSpace::Linear);
+  EXPECT_FLOAT_EQ(srgb.fetch(0, 1).x, srgbToLinear(0.4f));
+  EXPECT_FLOAT_EQ(linear.fetch(0, 1).x, 0.4f);
+  EXPECT_FLOAT_EQ(srgb.fetch(1, 0).w, 0.2f);
+  EXPECT_EQ(srgb.bytes(), 16u);  // 8 bits stay 8 bits
+}
+
+TEST(Texture, GreyReplicatesAndAlphaIsOne) {
+  Image grey(1, 1, 1, 0.6f);
+  EXPECT_EQ(decoded({"grey", "", *encodePng(grey)}, ColorSpace::Linear).fetch(0, 0), Vec4(0.6f, 0.6f, 0.6f, 1));
+  Image greyAlpha(1, 1, 2, 0.6f);
+  greyAlpha.pixels[1] = 0.2f;
+  EXPECT_EQ(decoded({"ga", "", *encodePng(greyAlpha)}, ColorSpace::Linear).fetch(0, 0), Vec4(0.6f, 0.6f, 0.6f, 0.2f));
+}
+
+TEST(Texture, BilinearMeetsTexelCentresAndMeansBetween) {
+  const Texture t = decoded(checker(), ColorSpace::Linear);
+  TextureRef clamp;
+  clamp.wrapU = clamp.wrapV = Wrap::Clamp;
+  EXPECT_FLOAT_EQ(t.sample(clamp, {0.25f, 0.25f}).x, 0.0f);
+  EXPECT_FLOAT_EQ(t.sample(clamp, {0.75f, 0.75f}).x, 0.6f);
+  EXPECT_FLOAT_EQ(t.sample(clamp, {0.5f, 0.25f}).x, 0.5f);
+  EXPECT_FLOAT_EQ(t.sample(clamp, {0.5f, 0.5f}).x, 0.5f);
+  EXPECT_FLOAT_EQ(t.sample(clamp, {-5.0f, 0.25f}).x, 0.0f);
+  EXPECT_FLOAT_EQ(t.sample(clamp, {5.0f, 0.25f}).x, 1.0f);
+}
+
+TEST(Texture, WrapModes) {
+  const Texture t = decoded(checker(), ColorSpace::Linear);
+  TextureRef ref;
+  ref.nearest = true;
+  const auto at = [&](Wrap mode, float u) {
+    ref.wrapU = mode;
+    return t.sample(ref, {u, 0.1f}).x;
+  };
+  EXPECT_EQ(at(Wrap::Repeat, 1.1f), 0);
+  EXPECT_EQ(at(Wrap::Repeat, -0.1f), 1);
+  EXPECT_EQ(at(Wrap::Mirror, 1.1f), 1);
+  EXPECT_EQ(at(Wrap::Mirror, -0.1f), 0);
+  EXPECT_EQ(at(Wrap::Mirror, 2.1f), 0);
+  EXPECT_EQ(at(Wrap::Clamp, 9.0f), 1);
+  ref.nearest = false;
+  ref.wrapU = Wrap::Repeat;
+  EXPECT_FLOAT_EQ(t.sample(ref, {0.0f, 0.25f}).x, 0.5f);  // across the seam
+}
+
+TEST(Texture, TransformAppliesAndWildCoordinatesAreHarmless) {
+  const Texture t = decoded(checker(), ColorSpace::Linear);
+  TextureRef ref;
+  ref.nearest = true;
+  ref.uvMatrix = Mat3(Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0.5f, 0, 1));
+  EXPECT_EQ(t.sample(ref, {0.1f, 0.1f}).x, 1);
+  ref.nearest = false;
+  for (const float wild : {1e30f, -1e30f, NAN, INFINITY}) EXPECT_TRUE(std::isfinite(t.sample(ref, {wild, wild}).x));
+}
+
+TEST(Texture, MissingAndBrokenImagesAreErrors) {
+  EXPECT_EQ(Texture::decode({"gone", "", {}}, ColorSpace::Srgb).error().message, "gone: the image is missing");
+  auto cut = checker();
+  cut.encoded.resize(cut.encoded.size() / 2);
+  auto result = Texture::decode(cut, ColorSpace::Srgb);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().kind, ErrorKind::Input);
+}
+
+TEST(Environment, OrientationAsDocumented) {
+  Environment e;
+  e.image = Image(4, 2, 3);
+  for (int x = 0; x < 4; ++x)
+    for (int y = 0; y < 2; ++y) e.image.setRgb(x, y, Vec3(static_cast<float>(x), static_cast<float>(y), 0));
+  e.strength = 2;
+  // u = 0.5 + atan2(z, x) / 2pi: the texel x = 2 spans +x towards +z, its centre is 45 degrees between.
+  const float h = std::sqrt(0.5f);
+  const auto at = [&](const Vec3& d) { return environmentRadiance(e, d); };
+  EXPECT_NEAR(at({h, 0, h}).x, 2 * 2, 1e-5);
+  EXPECT_NEAR(at({-h, 0, h}).x, 2 * 3, 1e-5);
+  EXPECT_NEAR(at({-h, 0, -h}).x, 2 * 0, 1e-5);
+  EXPECT_NEAR(at({h, 0, -h}).x, 2 * 1, 1e-5);
+  EXPECT_NEAR(at({-1, 0, 0}).x, 2 * 1.5f, 1e-5);  // wraps: the mean of texels 3 and 0
+  EXPECT_NEAR(at({0, 1, 0}).y, 0, 1e-5);          // the top row is up, clamped at the pole
+  EXPECT_NEAR(at({0, -1, 0}).y, 2 * 1, 1e-5);
+  // A quarter turn counter-clockwise seen from above takes +x to -z: what stood at +x+z now stands at +x-z.
+  e.rotationDegrees = 90;
+  EXPECT_NEAR(at({h, 0, -h}).x, 2 * 2, 1e-5);
+  e.rotationDegrees = -630;  // the same turn
+  EXPECT_NEAR(at({h, 0, -h}).x, 2 * 2, 1e-5);
+  e.image = {};
+  e.color = {1, 2, 3};
+  EXPECT_EQ(at({0, 1, 0}), Vec3(2, 4, 6));
+}
+
+TEST(Environment, FilesAreCheckedPixelByPixel) {
+  const fs::path folder = fs::path(testing::TempDir()) / "lumel-environment";
+  fs::create_directories(folder);
+  Image sky(4, 2, 3, 1.5f);
+  ASSERT_TRUE(writeImage(folder / "good.exr", sky));
+  ASSERT_TRUE(writeImage(folder / "good.hdr", sky));
+  for (const char* name : {"good.exr", "good.hdr"}) {
+    auto good = loadEnvironment(folder / name);
+    ASSERT_TRUE(good) << good.error().message;
+    EXPECT_EQ(good->image.rgb(3, 1), Vec3(1.5f));
+  }
+  for (const float bad : {-1.0f, INFINITY}) {
+    sky.at(2, 1)[1] = bad;
+    ASSERT_TRUE(writeImage(folder / "bad.exr", sky));
+    auto result = loadEnvironment(folder / "bad.exr");
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().kind, ErrorKind::Input);
+    EXPECT_NE(result.error().message.find("pixel (2, 1) is "), std::string::npos);
+  }
+  WriteImageOptions bytes;
+  bytes.format = PixelFormat::U8;
+  ASSERT_TRUE(writeImage(folder / "low.png", Image(4, 2, 3, 0.5f), bytes));
+  auto low = loadEnvironment(folder / "low.png");
+  ASSERT_FALSE(low);
+  EXPECT_NE(low.error().message.find("holds integers (png), not radiance"), std::string::npos);
+  EXPECT_FALSE(loadEnvironment(folder / "gone.hdr"));
+}
+
+}  // namespace
+}  // namespace lumel
