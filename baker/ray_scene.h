@@ -7,20 +7,19 @@
 #include <vector>
 
 #include "baker/materials.h"
+#include "baker/sample_lanes.h"
 #include "scene/embree.h"
 #include "scene/expected.h"
 #include "scene/scene.h"
 
 namespace lumel {
 
-/// Rays travel in packets of one lane per texel.
-inline constexpr int kLanes = 16;
-
 /// How a packet is traced. Packet answers like Single but for ties and rounding: a bake uses one throughout.
+/// Embree's flag for coherent rays is not offered: with ROBUST and AVX-512, Embree 3.13's rtcOccluded16 never returns
+/// for some packets that are coherent in name only (one ray with a direction component of -1e-16 is enough).
 enum class TraceMode {
-  Single,    // one call per ray: the plain way, kept as the yardstick
-  Packet,    // rtcIntersect16, for rays without much in common
-  Coherent,  // rtcIntersect16 told that its rays lie close together
+  Single,  // one call per ray: the plain way, kept as the yardstick
+  Packet,  // 16 rays per call
 };
 
 /// Up to 16 rays that look for their closest hit. Lanes that are not set are not traced.
@@ -58,17 +57,23 @@ struct ScenePart {
   std::int64_t firstEmitter = -1;  // of its triangles among EmissiveTriangles; -1: it emits nothing
 };
 
-/// A surface found by a ray, both normals on the side that the ray came from.
+/// A surface found by a ray, its normal on the side that the ray came from.
 struct HitSurface {
   Vec3 p{0};         // world
   Vec3 ng{0, 0, 1};  // geometric normal
-  Vec3 ns{0, 0, 1};  // shading normal; dot(ng, ns) >= 0
-  Vec3 rayStart{0};  // of rays that leave it: offsetPoint
   bool backFace = false;
   int material = 0;
   std::uint32_t part = 0;
   TrianglePoint point;
+  std::array<Vec3, 3> corners;  // of the triangle, world
 };
+
+/// The start of a ray that leaves p, a point of the triangle, on the side of ng. It is moved along the normal so that
+/// rounding cannot put it behind the surface, and as far towards the triangle's centroid, so that it cannot lie beyond
+/// a wall that stands on the triangle's edge. The distance is a few units in the last place of the largest coordinate
+/// that took part in finding p (after Waechter and Binder 2019; without their fixed distance near the origin, so that
+/// scenes of any size work). `translation`: of the instance, for geometry that Embree places itself; zero else.
+Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const std::array<Vec3, 3>& corners, const Vec3& translation);
 
 class RayScene {
  public:
@@ -82,10 +87,17 @@ class RayScene {
   /// Precondition: rays.hit(lane).
   HitSurface surfaceAt(const RayPacket& rays, int lane) const;
 
+  /// Interpolated, on the side of hit.ng; hit.ng itself where the mesh has no usable normal.
+  Vec3 shadingNormal(const HitSurface& hit) const;
+  /// Where rays that leave the surface start.
+  Vec3 rayStart(const HitSurface& hit) const {
+    return offsetPoint(hit.p, hit.ng, hit.corners, translationOf(parts_[hit.part].instance));
+  }
+
   const std::vector<ScenePart>& parts() const { return parts_; }
   std::vector<ScenePart>& parts() { return parts_; }
   /// World-space corners, as wound in the primitive.
-  void corners(const ScenePart& part, std::uint32_t triangle, Vec3 out[3]) const;
+  std::array<Vec3, 3> corners(const ScenePart& part, std::uint32_t triangle) const;
 
   /// For offsetPoint: an instance's translation where Embree places it, zero where its triangles are in world space.
   Vec3 translationOf(int instance) const;
@@ -119,12 +131,5 @@ class RayScene {
   Vec3 boundsMin_{0};
   Vec3 boundsMax_{0};
 };
-
-/// The start of a ray that leaves p, a point of the triangle, on the side of ng. It is moved along the normal so that
-/// rounding cannot put it behind the surface, and as far towards the triangle's centroid, so that it cannot lie beyond
-/// a wall that stands on the triangle's edge. The distance is a few units in the last place of the largest coordinate
-/// that took part in finding p (after Waechter and Binder 2019; without their fixed distance near the origin, so that
-/// scenes of any size work). `translation`: of the instance, for geometry that Embree places itself; zero else.
-Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const Vec3 corners[3], const Vec3& translation);
 
 }  // namespace lumel

@@ -9,13 +9,15 @@
 namespace lumel::ssbump {
 namespace {
 
-// Measured against 16k rays on fractal, brick, step and rough fields of amplitudes 8 to 64: with 48 azimuths the error
-// is 15 to 25 times less than that of 300 random rays. Sharp steps need the 12 (with 4 their error doubles), smooth tall
-// fields the 16 steps per octave (with 8 it doubles).
+// Measured against 16k rays on fractal, brick and step fields of amplitudes 8 to 64. Sharp steps need the 12 texels (with
+// 4 their error doubles); 16 steps per octave gain a tenth over 12 for a fifth more time, 8 cost brick joints a third.
 constexpr double kExactReach = 12;   // up to here every edge that the slice crosses is looked at
-constexpr int kStepsPerOctave = 16;  // beyond kUnitReach: box maxima, the box as wide as the step
+constexpr int kStepsPerOctave = 12;  // beyond kUnitReach: maxima over windows as long as the step
 constexpr int kUnitReach = 2 * kStepsPerOctave;  // up to here every crossing along the dominant axis
-
+// Where in its window a maximum is taken to be, from the centre, in lengths: a rising slope has it at the far end. A
+// quarter leaves a mean error below 5e-4 on fractals and steps of amplitude 24 (0: darker, 1/2: steps too bright).
+constexpr double kWindowEnd = 0.25;
+constexpr std::size_t kRowsAtOnce = 8;
 constexpr std::size_t kStepsPerGroup = 8;  // between the kernel's looks at whether anything higher can come
 
 struct LerpStep {
@@ -24,7 +26,7 @@ struct LerpStep {
 };
 
 struct BoxStep {
-  int level, x, y;
+  int level, x, y;  // level 2k - 1: windows of 2^k along x; 2k: along y
   float inverseDistance;
 };
 
@@ -98,16 +100,15 @@ Slice makeSlice(double phi, int reach, int levels, std::span<const Lobe> lobes) 
   for (int level = 1; level <= levels; ++level) {
     const int box = 1 << level;
     for (int j = 0; j < kStepsPerOctave; ++j) {
-      // The box covers the whole steps (n + j) box + 1 ... (n + j + 1) box along the dominant axis, about its centre.
-      // It is as wide across the slice as along it, so its maximum is too high on average; taking it at the box's far
-      // end cancels most of that (bias on fractals of amplitude 64: -0.0009 instead of -0.0019).
+      // The window covers the whole steps (n + j) box + 1 ... (n + j + 1) box along the dominant axis, about its centre;
+      // its highest texel may be anywhere in it.
       const double centre = (kStepsPerOctave + j) * box + (box + 1) / 2.0;
-      const double distance = (centre + box / 2.0) / std::abs(major);
+      const double distance = (centre + kWindowEnd * box) / std::abs(major);
       if (centre / std::abs(major) > reach) break;
-      // A level's entry p is the maximum over [p - box/2, p + box/2): its centre lies half a texel lower.
+      // Windows of even width about p reach from p - width / 2: their centre lies half a texel lower.
       const int p = static_cast<int>(std::lround(std::copysign(centre, major) + 0.5));
-      const int m = static_cast<int>(std::lround(centre * minor / std::abs(major) + 0.5));
-      slice.boxes.push_back({level, alongX ? p : m, alongX ? m : p, static_cast<float>(1 / distance)});
+      const int m = static_cast<int>(std::lround(centre * minor / std::abs(major) + (MaxLevel::across(box) > 1 ? 0.5 : 0.0)));
+      slice.boxes.push_back({2 * level - (alongX ? 1 : 0), alongX ? p : m, alongX ? m : p, static_cast<float>(1 / distance)});
     }
   }
   slice.boxGroups = groupsOf(slice.boxes);
@@ -139,6 +140,27 @@ struct RowPointers {
       boxInverse.push_back(s.inverseDistance);
     }
   }
+
+  HorizonRow row(const Slice& slice, const float* own, float highest, float* const* sums, int width) const {
+    HorizonRow r;
+    r.own = own;
+    r.lerpA = a.data();
+    r.lerpB = b.data();
+    r.fraction = fraction.data();
+    r.lerpInverse = lerpInverse.data();
+    r.lerpGroups = slice.lerpGroups.data();
+    r.lerpGroupCount = slice.lerpGroups.size();
+    r.box = box.data();
+    r.boxInverse = boxInverse.data();
+    r.boxGroups = slice.boxGroups.data();
+    r.boxGroupCount = slice.boxGroups.size();
+    r.highest = highest;
+    r.slices = slice.lobes.data();
+    r.channels = slice.lobes.size();
+    r.sums = sums;
+    r.width = width;
+    return r;
+  }
 };
 
 }  // namespace
@@ -164,49 +186,32 @@ Image Horizon::occlusion(const TexelRect& rect, std::span<const Lobe> lobes) con
     for (std::size_t c = 0; c < lobes.size(); ++c) open[c] += slices.back().lobes[c].open;
   }
   std::vector<MaxLevel> levels;
-  for (int level = 0; level <= levelsUsed; ++level) {
-    const int box = 1 << level;
-    const int range = level == 0 ? kUnitReach + 1 : 2 * kStepsPerOctave * box + box;
-    levels.emplace_back(rows_, rect, box, range, kHorizonBlock);
-  }
+  levels.emplace_back(rows_, rect, 1, Along::X, kUnitReach + 1, kHorizonBlock);
+  for (int level = 1; level <= levelsUsed; ++level)
+    for (Along along : {Along::X, Along::Y})
+      levels.emplace_back(rows_, rect, 1 << level, along, (2 * kStepsPerOctave + 1) << level, kHorizonBlock);
   const int padded = (rect.width + kHorizonBlock - 1) / kHorizonBlock * kHorizonBlock;
   const auto width = static_cast<std::size_t>(rect.width);
   Image out(rect.width, rect.height, static_cast<int>(lobes.size()));
-  parallelFor(static_cast<std::size_t>(rect.height), 8, [&](std::size_t first, std::size_t last) {
+  parallelFor(static_cast<std::size_t>(rect.height), kRowsAtOnce, [&](std::size_t first, std::size_t last) {
     RowPointers pointers;
-    std::vector<float> sums(lobes.size() * static_cast<std::size_t>(padded));
-    std::vector<float*> sumRows;
-    for (std::size_t c = 0; c < lobes.size(); ++c) sumRows.push_back(&sums[c * static_cast<std::size_t>(padded)]);
-    for (std::size_t y = first; y < last; ++y) {
-      std::fill(sums.begin(), sums.end(), 0.0f);
-      const int mapY = rect.y + static_cast<int>(y);
-      for (const Slice& slice : slices) {
+    const std::size_t rowSums = lobes.size() * static_cast<std::size_t>(padded);
+    std::vector<float> sums((last - first) * rowSums);
+    std::vector<float*> sumRows(lobes.size());
+    // All rows of one azimuth before the next: neighbouring rows meet in the same stored rows of the far levels.
+    for (const Slice& slice : slices)
+      for (std::size_t y = first; y < last; ++y) {
+        const int mapY = rect.y + static_cast<int>(y);
+        for (std::size_t c = 0; c < lobes.size(); ++c) sumRows[c] = &sums[(y - first) * rowSums + c * static_cast<std::size_t>(padded)];
         pointers.set(slice, levels, rect.x, mapY);
-        HorizonRow row;
-        row.own = levels[0].at(rect.x, mapY);
-        row.lerpA = pointers.a.data();
-        row.lerpB = pointers.b.data();
-        row.fraction = pointers.fraction.data();
-        row.lerpInverse = pointers.lerpInverse.data();
-        row.lerpGroups = slice.lerpGroups.data();
-        row.lerpGroupCount = slice.lerpGroups.size();
-        row.box = pointers.box.data();
-        row.boxInverse = pointers.boxInverse.data();
-        row.boxGroups = slice.boxGroups.data();
-        row.boxGroupCount = slice.boxGroups.size();
-        row.highest = rows_.field().highest;
-        row.slices = slice.lobes.data();
-        row.channels = lobes.size();
-        row.sums = sumRows.data();
-        row.width = padded;
-        horizonRow(row, settings_.simd);
+        horizonRow(pointers.row(slice, levels[0].at(rect.x, mapY), rows_.field().highest, sumRows.data(), padded), settings_.simd);
       }
+    for (std::size_t y = first; y < last; ++y)
       for (std::size_t c = 0; c < lobes.size(); ++c) {
+        const float* in = &sums[(y - first) * rowSums + c * static_cast<std::size_t>(padded)];
         float* o = out.pixels.data() + y * width * lobes.size() + c;
-        for (std::size_t x = 0; x < width; ++x)
-          o[x * lobes.size()] = open[c] > 0 ? std::clamp(sumRows[c][x] / open[c], 0.0f, 1.0f) : 1.0f;
+        for (std::size_t x = 0; x < width; ++x) o[x * lobes.size()] = open[c] > 0 ? std::clamp(in[x] / open[c], 0.0f, 1.0f) : 1.0f;
       }
-    }
   });
   return out;
 }

@@ -79,27 +79,25 @@ void RowMaxima::band(int y0, int y1, int x0, std::span<float> out) const {
   }
 }
 
-MaxLevel::MaxLevel(const RowMaxima& rows, const TexelRect& tile, int box, int range, int padding)
-    : box_(box), stride_(std::max(1, box / 2)), x0_(tile.x - range), width_(tile.width + 2 * range + padding) {
+MaxLevel::MaxLevel(const RowMaxima& rows, const TexelRect& tile, int length, Along along, int range, int padding)
+    : stride_(std::max(1, along == Along::X ? across(length) / 2 : length / 4)),
+      x0_(tile.x - range),
+      width_(tile.width + 2 * range + padding) {
+  const int windowX = along == Along::X ? length : across(length), windowY = along == Along::X ? across(length) : length;
   firstRow_ = floorDiv(tile.y - range, stride_);
   const int lastRow = floorDiv(tile.y + tile.height + range + stride_, stride_);
   const auto count = static_cast<std::size_t>(lastRow - firstRow_ + 1);
   const auto width = static_cast<std::size_t>(width_);
   data_.resize(count * width);
   parallelFor(count, 8, [&](std::size_t begin, std::size_t end) {
-    std::vector<float> wide(width + static_cast<std::size_t>(box));
+    std::vector<float> wide(width + static_cast<std::size_t>(windowX - 1));
     for (std::size_t r = begin; r < end; ++r) {
-      const int y = (firstRow_ + static_cast<int>(r)) * stride_;
-      float* out = &data_[r * width];
-      if (box == 1) {
-        rows.band(y, y + 1, x0_, {out, width});
-        continue;
-      }
-      rows.band(y - box / 2, y + box / 2, x0_ - box / 2, wide);
-      for (int step = 1; step < box; step *= 2)
+      const int y = (firstRow_ + static_cast<int>(r)) * stride_ - windowY / 2;
+      rows.band(y, y + windowY, x0_ - windowX / 2, wide);
+      for (int step = 1; step < windowX; step *= 2)
         for (std::size_t i = 0; i + static_cast<std::size_t>(step) < wide.size(); ++i)
           wide[i] = std::max(wide[i], wide[i + static_cast<std::size_t>(step)]);
-      std::copy(wide.begin(), wide.begin() + static_cast<std::ptrdiff_t>(width), out);
+      std::copy(wide.begin(), wide.begin() + static_cast<std::ptrdiff_t>(width), &data_[r * width]);
     }
   });
 }

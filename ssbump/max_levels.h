@@ -32,16 +32,23 @@ class RowMaxima {
   std::vector<std::vector<float>> groups_;  // [k]: rows of 2^(k + kFirstShift) map rows
 };
 
-/// One level around a tile: entry (x, y) is the maximum over the box of box x box texels [x - box/2, x + box/2) in both
-/// axes. Every column is stored, and every stride-th row, at map rows that are multiples of stride: a tile's result does
-/// not depend on where tiles begin.
+/// Which way a level's windows are long.
+enum class Along { X, Y };
+
+/// One level around a tile: entry (x, y) is the maximum over a window of `length` texels along one axis and a quarter of
+/// that across, [x - wx/2, x + wx - wx/2) and y likewise. Thin windows: over a random field a strip beside the slice has
+/// the statistics of the slice itself, a square would reach for what lies beside it; and joints that run along an axis
+/// stay open. Every column is stored, and every stride-th row, at map rows that are multiples of stride: a tile's result
+/// does not depend on where tiles begin.
 class MaxLevel {
  public:
-  /// Covers offsets up to `range` texels from the tile, and `padding` more columns on the right. box is 1 (the heights
-  /// themselves) or a power of two.
-  MaxLevel(const RowMaxima& rows, const TexelRect& tile, int box, int range, int padding);
+  /// Covers offsets up to `range` texels from the tile, and `padding` more columns on the right. `length` is 1 (the
+  /// heights themselves) or a power of two.
+  MaxLevel(const RowMaxima& rows, const TexelRect& tile, int length, Along along, int range, int padding);
 
-  int box() const { return box_; }
+  /// Width of a window across its length.
+  static int across(int length) { return length < 4 ? 1 : length / 4; }
+
   /// Pointer to column x of the stored row nearest to y; valid for the tile's width + padding from there.
   const float* at(int x, int y) const {
     const int stored = floorDiv(y + stride_ / 2, stride_) - firstRow_;
@@ -52,7 +59,7 @@ class MaxLevel {
  private:
   static int floorDiv(int a, int b) { return a >= 0 ? a / b : -((-a + b - 1) / b); }
 
-  int box_, stride_, x0_, width_, firstRow_;
+  int stride_, x0_, width_, firstRow_;
   std::vector<float> data_;
 };
 
