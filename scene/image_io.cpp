@@ -141,14 +141,15 @@ Expected<ImageWriter> ImageWriter::open(const std::filesystem::path& file, int w
   }
   for (const auto& [key, value] : options.metadata) spec.attribute(key, value);
   state->file = file;
-  state->temporary = file.parent_path() /
-                     ("." + file.stem().string() + "." + std::to_string(getpid()) + ".part" + file.extension().string());
+  state->temporary = file.parent_path() / ("." + file.stem().string() + "." + std::to_string(getpid()) + ".part" +
+                                           file.extension().string());
   state->format = options.format;
   state->width = width;
   state->height = height;
   state->channels = channels;
   state->spec = std::move(spec);
-  // The encoder opens with the first rows (libpng complains aloud about a file without any), so try the place itself now.
+  // The encoder opens with the first rows (libpng complains aloud about a file without any), so try the place itself
+  // now.
   std::FILE* trial = std::fopen(state->temporary.c_str(), "wb");
   if (!trial) return state->failed(std::strerror(errno));
   std::fclose(trial);

@@ -95,9 +95,9 @@ void keepChannel(Image& image, int channel) {
 
 }  // namespace
 
-Expected<HeightField> heightFieldFromImage(LoadedImage&& loaded, const HeightOptions& options, const std::string& name) {
-  if (loaded.paletted)
-    return inputError(name + ": indexed colours hold no heights; save it as 8- or 16-bit grey");
+Expected<HeightField> heightFieldFromImage(LoadedImage&& loaded, const HeightOptions& options,
+                                           const std::string& name) {
+  if (loaded.paletted) return inputError(name + ": indexed colours hold no heights; save it as 8- or 16-bit grey");
   if (options.channel.empty() && looksLikeNormalMap(loaded.image))
     return inputError(name + ": looks like a normal map, not heights; give it as --normal-map beside a height map, " +
                       "use --convert for weights without shadows, or choose a channel with --channel");
