@@ -67,6 +67,8 @@ TEST(HeightField, BadInputIsNamed) {
 
   LoadedImage palette = loaded(4, 4, {"R", "G", "B"});
   palette.paletted = true;
+  EXPECT_TRUE(heightFieldFromImage(LoadedImage(palette), texels, "h")) << "a table of greys is grey";
+  palette.image.pixels[4] = 0.9f;
   EXPECT_NE(heightFieldFromImage(std::move(palette), texels, "h").error().message.find("indexed"), std::string::npos);
 
   auto channel = heightFieldFromImage(loaded(4, 4, {"R", "G", "B"}), {.channel = "A", .scale = 1}, "h");
