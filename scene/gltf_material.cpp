@@ -168,11 +168,7 @@ Expected<void> MaterialLoader::run() {
   const bool needsDefault = std::any_of(meshes.begin(), meshes.end(), [](const auto& mesh) {
     return std::any_of(mesh.primitives.begin(), mesh.primitives.end(), [](const auto& p) { return p.material < 0; });
   });
-  if (needsDefault || scene_.materials.empty()) {
-    scene_.materials.emplace_back();
-    scene_.materials.back().name = "default";
-    scene_.materials.back().metallic = 1.0f;
-  }
+  if (needsDefault || scene_.materials.empty()) scene_.materials.push_back(defaultMaterial());
   for (const std::size_t index : wanted_) {
     auto source = load(document_.images[index], index);
     if (!source) return source.error();

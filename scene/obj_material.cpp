@@ -207,8 +207,7 @@ Expected<void> loadObjMaterials(const ObjFile& file, const std::string& name, co
   for (const ObjMaterial& material : file.materials)
     if (auto error = loader.add(material)) return *error;
   dropUnusedImages(scene);
-  scene.materials.emplace_back();
-  scene.materials.back().name = "default";
+  scene.materials.push_back(defaultMaterial());
   return {};
 }
 

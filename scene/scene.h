@@ -135,6 +135,14 @@ struct LoadReport {
   std::size_t skippedPrimitives = 0;     // points and lines
 };
 
+/// What a surface without a material is made of: grey, since white without end would drown a closed level in light.
+inline Material defaultMaterial() {
+  Material material;
+  material.name = "default";
+  material.baseColor = {0.8f, 0.8f, 0.8f, 1.0f};
+  return material;
+}
+
 struct Scene {
   std::vector<Mesh> meshes;
   std::vector<Instance> instances;
