@@ -150,6 +150,7 @@ float EmissiveTriangles::describe(Emitter& emitter) const {
   emitter.e2 = corners[2] - corners[0];
   const Vec3 cross = glm::cross(emitter.e1, emitter.e2);
   emitter.ng = glm::normalize(cross) * part.frontSign;
+  emitter.offsetMeters = offsetDistance(corners, part.translation);
   emitter.doubleSided = material.doubleSided;
   emitter.uniform = !material.emissionMap && !materials_->needsAlphaTest(*part.primitive);
   emitter.radiance = materials_->emission({part.primitive, emitter.triangle, Vec2(1.0f / 3)});
@@ -180,8 +181,7 @@ LightSample EmissiveTriangles::sample(const Vec3& p, float uTriangle, Vec2 uPoin
   if (!(cosLight > 0.0f)) return sample;
   sample.pdf = emitter.densityByArea * distance2 / cosLight;
   sample.weight = radianceAt(emitter, b) / sample.pdf;
-  const std::array<Vec3, 3> corners = {emitter.corner, emitter.corner + emitter.e1, emitter.corner + emitter.e2};
-  sample.target = offsetPoint(q, ng, corners, rays_->translationOf(rays_->parts()[emitter.part].instance));
+  sample.target = q + ng * emitter.offsetMeters;
   return sample;
 }
 

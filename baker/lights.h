@@ -71,6 +71,7 @@ class EmissiveTriangles {
     Vec3 e1{0};      // to the other corners
     Vec3 e2{0};
     Vec3 ng{0};                  // unit, front
+    float offsetMeters = 0.0f;   // of the ends of shadow rays
     float densityByArea = 0.0f;  // probability of choosing it over its area
     std::uint32_t part = 0;
     std::uint32_t triangle = 0;

@@ -40,16 +40,6 @@ float rayHash(RTCRayN* ray, unsigned int rays, unsigned int lane, std::uint32_t 
 
 }  // namespace
 
-Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const std::array<Vec3, 3>& corners, const Vec3& translation) {
-  const float largest = std::max({maxAbs(corners[0]), maxAbs(corners[1]), maxAbs(corners[2])}) + maxAbs(translation);
-  const float distance = 8.0f * std::numeric_limits<float>::epsilon() * largest;
-  const Vec3 inwards = (corners[0] - p) + (corners[1] - p) + (corners[2] - p);
-  const float reach = glm::length(inwards);
-  // At most half the way to the centroid, which lies at inwards / 3.
-  const float share = reach > 6.0f * distance ? distance / reach : 1.0f / 6.0f;
-  return p + (ng * distance + inwards * share);
-}
-
 void RayPacket::clear() { std::fill(std::begin(valid), std::end(valid), 0); }
 
 void RayPacket::set(int lane, const Vec3& origin, const Vec3& dir) {
@@ -128,6 +118,7 @@ Expected<void> RayScene::buildGeometry() {
     }
     const auto shared = meshScene(instance.mesh);
     if (!shared) return shared.error();
+    for (std::uint32_t p = firstPart; p < parts_.size(); ++p) parts_[p].translation = translationOf(parts_[p].instance);
     EmbreeGeometry placed(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
     rtcSetGeometryInstancedScene(placed.get(), *shared);
     rtcSetGeometryTransform(placed.get(), 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, &instance.worldFromObject);
@@ -258,10 +249,10 @@ std::uint32_t RayScene::partOf(const RayPacket& rays, int lane) const {
   return partOfGeometry_[instance] + hit.geomID[lane];
 }
 
-Vec3 RayScene::translationOf(int instance) const {
+float RayScene::translationOf(int instance) const {
   const Instance& placed = scene_->instances[static_cast<std::size_t>(instance)];
   const bool byEmbree = placed.settings.casts && meshScenes_[static_cast<std::size_t>(placed.mesh)];
-  return byEmbree ? Vec3(placed.worldFromObject[3]) : Vec3(0.0f);
+  return byEmbree ? maxAbs(Vec3(placed.worldFromObject[3])) : 0.0f;
 }
 
 std::array<Vec3, 3> RayScene::corners(const ScenePart& part, std::uint32_t triangle) const {

@@ -129,7 +129,8 @@ Expected<void> runConvert(const SsbumpArguments& a) {
     settings.from = MapForm{{}, a.normalGreen};
   else if (a.from != FromWord::File)
     settings.from = MapForm{Encoding{conventionOf(static_cast<int>(a.from) - 1), a.fromHand}, Green::Up};
-  settings.to = a.to == ToWord::Normal ? MapForm{{}, a.saveGreen} : MapForm{Encoding{conventionOf(static_cast<int>(a.to)), a.hand}, Green::Up};
+  settings.to = a.to == ToWord::Normal ? MapForm{{}, a.saveGreen}
+                                       : MapForm{Encoding{conventionOf(static_cast<int>(a.to)), a.hand}, Green::Up};
   settings.detail = a.detail;
   settings.detailRepeats = a.detailRepeats;
   settings.crossFade = a.crossFade;
@@ -141,9 +142,11 @@ Expected<void> runConvert(const SsbumpArguments& a) {
 
 void tell(const CommandContext& context, const BakeReport& report) {
   if (context.quiet) return;
-  std::fprintf(stderr, "%dx%d texels, heights %g to %g texels, occluders within %d texels; %.2f s read and prepared, %.2f s occlusion\n",
-               report.width, report.height, static_cast<double>(report.lowestTexels), static_cast<double>(report.highestTexels),
-               report.reachTexels, report.prepareSeconds, report.occlusionSeconds);
+  std::fprintf(
+      stderr,
+      "%dx%d texels, heights %g to %g texels, occluders within %d texels; %.2f s read and prepared, %.2f s occlusion\n",
+      report.width, report.height, static_cast<double>(report.lowestTexels), static_cast<double>(report.highestTexels),
+      report.reachTexels, report.prepareSeconds, report.occlusionSeconds);
   for (const std::string& warning : report.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
 }
 
@@ -210,17 +213,23 @@ Expected<void> runSsbump(const SsbumpArguments& a, CommandContext& context) {
 }
 
 void declareInput(OptionTable& o, SsbumpArguments& a) {
-  Option& input = o.positionalPath("input", a.input, "A height map (any image), a high-poly mesh (.gltf, .glb, .obj), or with --convert an ssbump or normal map");
+  Option& input = o.positionalPath(
+      "input", a.input,
+      "A height map (any image), a high-poly mesh (.gltf, .glb, .obj), or with --convert an ssbump or normal map");
   input.placeholder = "INPUT";
   o.path("output", a.output, "The ssbump map: .png, .tga, .tif, .exr or .dds").shortName = "o";
   o.group("Heights");
-  Option& scale = o.text("height-scale", a.heightScale, "Height of a map value of 1: in texels (24) or of the width (5%)");
+  Option& scale =
+      o.text("height-scale", a.heightScale, "Height of a map value of 1: in texels (24) or of the width (5%)");
   scale.placeholder = "H";
-  o.text("channel", a.channel, "Channel that holds the heights: a name, an index or luminance; else the first").placeholder = "NAME";
+  o.text("channel", a.channel, "Channel that holds the heights: a name, an index or luminance; else the first")
+      .placeholder = "NAME";
   o.flag("invert", a.invert, "Dark is high");
   o.flag("wrap", a.wrap, "The map tiles (default); --no-wrap: it ends at its edges");
-  o.integer("bilateral", a.bilateral, {0, 64}, "Smooth stair-steps within this radius in texels, keeping edges; 0 = off");
-  o.number("bilateral-threshold", a.bilateralThreshold, {0, 1e6f}, "Height steps (texels) from this on are edges; 0 = two steps of the file");
+  o.integer("bilateral", a.bilateral, {0, 64},
+            "Smooth stair-steps within this radius in texels, keeping edges; 0 = off");
+  o.number("bilateral-threshold", a.bilateralThreshold, {0, 1e6f},
+           "Height steps (texels) from this on are edges; 0 = two steps of the file");
   o.path("normal-map", a.normalMap, "Normals for the weights; else from the heights");
   o.choice("green", a.normalGreen, {"up", "down"}, "Green of a normal map that is read: up (OpenGL) or down (DirectX)");
   o.group("Meshes");
@@ -236,7 +245,8 @@ void declareInput(OptionTable& o, SsbumpArguments& a) {
 
 void declareOcclusion(OptionTable& o, SsbumpArguments& a) {
   o.group("Occlusion");
-  o.choice("method", a.method, {"horizon", "rays"}, "horizon: exact horizons, noise-free; rays: Embree, for checks (meshes always use rays)");
+  o.choice("method", a.method, {"horizon", "rays"},
+           "horizon: exact horizons, noise-free; rays: Embree, for checks (meshes always use rays)");
   o.integer("azimuths", a.azimuths, {1, 1024}, "Slices of the horizon method");
   o.integer("rays", a.rays, {1, 1 << 20}, "Rays per texel");
   o.choice("sampling", a.sampling, {"random", "stratified", "sobol"}, "How rays are spread");
@@ -244,13 +254,16 @@ void declareOcclusion(OptionTable& o, SsbumpArguments& a) {
   o.integer("reach", a.reach, {0, 1 << 20}, "Texels beyond which nothing occludes; 0 = as far as the heights matter");
   o.choice("lobe", a.lobe, {"hemisphere", "cone"}, "Directions that count around each basis vector");
   o.number("cone-angle", a.coneAngle, {1, 180}, "Total opening of the cone in degrees");
-  o.text("basis", a.basis, "rnm, or a text file with a unit vector x y z per line: one channel each").placeholder = "rnm|FILE";
-  o.integer("threads", a.threads, {0, 1024}, "Threads; 0 = one per core. Results do not depend on it").defaultText = "0";
+  o.text("basis", a.basis, "rnm, or a text file with a unit vector x y z per line: one channel each").placeholder =
+      "rnm|FILE";
+  o.integer("threads", a.threads, {0, 1024}, "Threads; 0 = one per core. Results do not depend on it").defaultText =
+      "0";
 }
 
 void declareMaps(OptionTable& o, SsbumpArguments& a) {
   o.group("Maps");
-  o.choice("convention", a.convention, {"squared", "linear", "mod2x"}, "Weights: flat is 1/3, 1/sqrt3 or 1/2 in each channel");
+  o.choice("convention", a.convention, {"squared", "linear", "mod2x"},
+           "Weights: flat is 1/3, 1/sqrt3 or 1/2 in each channel");
   o.choice("hand", a.hand, {"right", "left"}, "left swaps G and B, for engines whose bitangent points down");
   o.choice("bits", a.bits, {"auto", "8", "16", "half", "float"}, "Sample format; auto is 8, for .exr half");
   o.flag("mips", a.mips, "Full mip chains as NAME.mip1.EXT and on (.dds always holds its chain)");
@@ -266,10 +279,12 @@ void declareMaps(OptionTable& o, SsbumpArguments& a) {
   o.path("mask", a.mask, "First channel becomes the alpha channel, untouched (else the input's alpha)");
   o.path("detail", a.detail, "Blend in this ssbump map, evenly over the channels");
   o.number("detail-repeats", a.detailRepeats, {0.001f, 1000}, "Repeats of the detail map across the map");
-  o.path("contact-sheet", a.contactSheet, "Also a picture: heights, normals, weights, with occlusion; recovered, AO, lit from right and top");
+  o.path("contact-sheet", a.contactSheet,
+         "Also a picture: heights, normals, weights, with occlusion; recovered, AO, lit from right and top");
   o.group("Other work");
   o.flag("convert", a.convert, "INPUT is an ssbump or a normal map: write it as --to, --hand and --bits say");
-  o.choice("from", a.from, {"file", "squared", "linear", "mod2x", "normal"}, "What INPUT holds; file: what its metadata says");
+  o.choice("from", a.from, {"file", "squared", "linear", "mod2x", "normal"},
+           "What INPUT holds; file: what its metadata says");
   o.choice("from-hand", a.fromHand, {"right", "left"}, "Handedness of INPUT");
   o.choice("to", a.to, {"squared", "linear", "mod2x", "normal"}, "What to write");
   o.path("cross-fade", a.crossFade, "Mix INPUT with this map of the same form and size");

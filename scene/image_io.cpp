@@ -5,11 +5,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <system_error>
 
 #include "scene/check.h"
@@ -19,7 +21,18 @@ namespace {
 
 constexpr int kMaxDimension = 65536;
 
-Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& name) {
+using Head = std::array<std::uint8_t, 32>;  // a file's first bytes, zero where it is shorter
+
+/// Whether the file stores indices into a table of colours. OpenImageIO expands them and says so for some formats only:
+/// PNG's colour type and TGA's image type are read from the header.
+bool storesPalette(const OIIO::ImageSpec& spec, std::string_view format, const Head& head) {
+  if (format == "png") return head[25] == 3;
+  if (format == "targa") return head[2] == 1 || head[2] == 9;
+  if (format == "bmp") return spec.get_int_attribute("bmp:bitsperpixel", 24) <= 8;
+  return format == "gif" || spec.get_string_attribute("tiff:ColorSpace") == "palette";
+}
+
+Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& name, const Head& head) {
   const OIIO::ImageSpec& spec = input.spec();
   if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0)
     return inputError(name + ": the image has no pixels");
@@ -30,8 +43,7 @@ Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& nam
   loaded.format = input.format_name();
   loaded.bitsPerChannel = static_cast<int>(spec.format.size()) * 8;
   loaded.isFloat = spec.format.is_floating_point();
-  loaded.paletted = spec.get_int_attribute("png:ColorType", -1) == 3 || spec.get_int_attribute("tiff:ColorSpace", -1) == 3 ||
-                    spec.get_string_attribute("tiff:ColorSpace") == "palette" || loaded.format == "gif";
+  loaded.paletted = storesPalette(spec, loaded.format, head);
   loaded.channelNames.assign(spec.channelnames.begin(), spec.channelnames.end());
   for (const OIIO::ParamValue& attribute : spec.extra_attribs)
     if (attribute.type().basetype == OIIO::TypeDesc::STRING || attribute.type().basevalues() == 1)
@@ -52,10 +64,14 @@ Expected<LoadedImage> readImage(const std::filesystem::path& file) {
   config.attribute("oiio:UnassociatedAlpha", 1);
   auto input = OIIO::ImageInput::open(file.string(), &config);
   if (!input) return inputError(file.string() + ": not an image that can be read: " + OIIO::geterror());
-  return readOpened(*input, file.string());
+  Head head{};
+  std::ifstream(file, std::ios::binary).read(reinterpret_cast<char*>(head.data()), head.size());
+  return readOpened(*input, file.string(), head);
 }
 
 Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std::string& name) {
+  Head head{};
+  std::copy_n(encoded.begin(), std::min(encoded.size(), head.size()), head.begin());
   OIIO::Filesystem::IOMemReader memory(const_cast<std::uint8_t*>(encoded.data()), encoded.size());
   // The extension chooses the decoder: OpenImageIO tries all readers only for files on disk.
   const auto startsWith = [&](std::initializer_list<int> magic, std::size_t at = 0) {
@@ -86,7 +102,7 @@ Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std
       const bool written = std::fwrite(encoded.data(), 1, encoded.size(), f) == encoded.size();
       std::fclose(f);
       input = written ? OIIO::ImageInput::open(file.string(), &config) : nullptr;
-      auto result = input ? readOpened(*input, name)
+      auto result = input ? readOpened(*input, name, head)
                           : Expected<LoadedImage>(inputError(name + ": not an image that can be read: " + OIIO::geterror()));
       std::error_code ec;
       std::filesystem::remove(file, ec);
@@ -94,7 +110,7 @@ Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std
     }
     return inputError(name + ": not an image that can be read: " + OIIO::geterror());
   }
-  return readOpened(*input, name);
+  return readOpened(*input, name, head);
 }
 
 struct ImageWriter::State {
@@ -141,14 +157,15 @@ Expected<ImageWriter> ImageWriter::open(const std::filesystem::path& file, int w
   }
   for (const auto& [key, value] : options.metadata) spec.attribute(key, value);
   state->file = file;
-  state->temporary = file.parent_path() /
-                     ("." + file.stem().string() + "." + std::to_string(getpid()) + ".part" + file.extension().string());
+  state->temporary = file.parent_path() / ("." + file.stem().string() + "." + std::to_string(getpid()) + ".part" +
+                                           file.extension().string());
   state->format = options.format;
   state->width = width;
   state->height = height;
   state->channels = channels;
   state->spec = std::move(spec);
-  // The encoder opens with the first rows (libpng complains aloud about a file without any), so try the place itself now.
+  // The encoder opens with the first rows (libpng complains aloud about a file without any), so try the place itself
+  // now.
   std::FILE* trial = std::fopen(state->temporary.c_str(), "wb");
   if (!trial) return state->failed(std::strerror(errno));
   std::fclose(trial);

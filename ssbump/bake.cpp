@@ -35,12 +35,15 @@ Expected<Image> readNormalMap(const std::filesystem::path& file, int width, int 
   auto loaded = readImage(file);
   if (!loaded) return loaded.error();
   const Image& image = loaded->image;
-  if (image.channels < 3) return inputError(file.string() + ": a normal map has three channels, this has " + std::to_string(image.channels));
+  if (image.channels < 3)
+    return inputError(file.string() + ": a normal map has three channels, this has " + std::to_string(image.channels));
   if (image.width != width || image.height != height)
-    return inputError(file.string() + ": the normal map is " + std::to_string(image.width) + "x" + std::to_string(image.height) +
-                      ", the height map " + std::to_string(width) + "x" + std::to_string(height) + "; make them the same size");
+    return inputError(file.string() + ": the normal map is " + std::to_string(image.width) + "x" +
+                      std::to_string(image.height) + ", the height map " + std::to_string(width) + "x" +
+                      std::to_string(height) + "; make them the same size");
   for (std::size_t i = 0; i < image.pixels.size(); ++i)
-    if (!std::isfinite(image.pixels[i])) return inputError(file.string() + ": holds a value that is not a finite number");
+    if (!std::isfinite(image.pixels[i]))
+      return inputError(file.string() + ": holds a value that is not a finite number");
   return std::move(loaded->image);
 }
 
@@ -54,7 +57,8 @@ Expected<Inputs> readInputs(const std::filesystem::path& input, const BakeSettin
   if (!loaded) return loaded.error();
   Inputs inputs;
   const double bits = loaded->isFloat ? 0 : loaded->bitsPerChannel;
-  if (auto channel = findChannel(*loaded, settings.height.channel, input.string())) inputs.alpha = alphaPlane(*loaded, *channel);
+  if (auto channel = findChannel(*loaded, settings.height.channel, input.string()))
+    inputs.alpha = alphaPlane(*loaded, *channel);
   auto field = heightFieldFromImage(std::move(*loaded), settings.height, input.string());
   if (!field) return field.error();
   inputs.field = std::move(*field);
@@ -62,7 +66,8 @@ Expected<Inputs> readInputs(const std::filesystem::path& input, const BakeSettin
     float threshold = settings.bilateralThresholdTexels;
     if (threshold <= 0) {
       if (bits == 0) return usageError("--bilateral on a float map needs --bilateral-threshold (in texels of height)");
-      const double scale = settings.height.scaleIsPercent ? settings.height.scale / 100 * inputs.field.width : settings.height.scale;
+      const double scale =
+          settings.height.scaleIsPercent ? settings.height.scale / 100 * inputs.field.width : settings.height.scale;
       threshold = static_cast<float>(2 * std::abs(scale) / (std::exp2(bits) - 1));
     }
     bilateralFilter(inputs.field, settings.bilateralRadius, threshold);
@@ -81,8 +86,9 @@ Image bandNormals(const Inputs& inputs, Green green, int firstRow, int rows) {
     for (std::size_t r = first; r < last; ++r) {
       const int y = static_cast<int>(r);
       for (int x = 0; x < normals.width; ++x)
-        normals.setRgb(x, y, inputs.normalMap.empty() ? heightNormal(inputs.field, x, firstRow + y)
-                                                      : decodeNormal(inputs.normalMap.rgb(x, firstRow + y), green));
+        normals.setRgb(x, y,
+                       inputs.normalMap.empty() ? heightNormal(inputs.field, x, firstRow + y)
+                                                : decodeNormal(inputs.normalMap.rgb(x, firstRow + y), green));
     }
   });
   return normals;
@@ -90,14 +96,17 @@ Image bandNormals(const Inputs& inputs, Green green, int firstRow, int rows) {
 
 void copyInto(Image& band, int x0, const Image& tile) {
   for (int y = 0; y < tile.height; ++y)
-    std::copy_n(tile.at(0, y), static_cast<std::size_t>(tile.width) * static_cast<std::size_t>(tile.channels), band.at(x0, y));
+    std::copy_n(tile.at(0, y), static_cast<std::size_t>(tile.width) * static_cast<std::size_t>(tile.channels),
+                band.at(x0, y));
 }
 
 std::map<std::string, std::string> describe(const BakeSettings& s, const HeightField& field, int reach) {
   std::map<std::string, std::string> m;
   m["lumel:height"] = std::to_string(field.lowest) + " to " + std::to_string(field.highest) + " texels";
   m["lumel:wrap"] = field.wrap ? "yes" : "no";
-  m["lumel:lobe"] = s.maps.lobe == LobeShape::Hemisphere ? "hemisphere" : "cone of " + std::to_string(s.maps.coneOpeningDegrees) + " degrees";
+  m["lumel:lobe"] = s.maps.lobe == LobeShape::Hemisphere
+                        ? "hemisphere"
+                        : "cone of " + std::to_string(s.maps.coneOpeningDegrees) + " degrees";
   m["lumel:occlusion"] = s.backEnd == BackEnd::Horizon ? "horizons, " + std::to_string(s.horizon.azimuths) + " azimuths"
                                                        : "rays, " + std::to_string(s.rays.count) + " per texel";
   m["lumel:reach"] = std::to_string(reach) + " texels";
@@ -162,7 +171,8 @@ Expected<BakedInMemory> bakeInMemory(const std::filesystem::path& input, const B
   return BakedInMemory{std::move(inputs->field), std::move(normals), std::move(*occlusion)};
 }
 
-Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const BakeSettings& settings, Progress& progress) {
+Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const BakeSettings& settings,
+                                   Progress& progress) {
   LUMEL_CHECK(settings.tileHeight % 2 == 0 && settings.tileWidth > 0);
   const auto started = Clock::now();
   auto inputs = readInputs(input, settings);
@@ -178,7 +188,8 @@ Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const Bak
 
   auto occluder = Occluder::prepare(field, settings);
   if (!occluder) return occluder.error();
-  auto maps = MapSet::open(settings.maps, field.width, field.height, std::move(inputs->alpha), describe(settings, field, report.reachTexels));
+  auto maps = MapSet::open(settings.maps, field.width, field.height, std::move(inputs->alpha),
+                           describe(settings, field, report.reachTexels));
   if (!maps) return maps.error();
   report.prepareSeconds = secondsSince(started);
 
@@ -189,12 +200,14 @@ Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const Bak
     auto occlusion = bandOcclusion(*occluder, settings, field.width, y, rows, maps->lobes(), progress);
     if (!occlusion) return occlusion.error();
     report.occlusionSeconds += secondsSince(before);
-    if (auto done = maps->write(bandNormals(*inputs, settings.normalMapGreen, y, rows), *occlusion); !done) return done.error();
+    if (auto done = maps->write(bandNormals(*inputs, settings.normalMapGreen, y, rows), *occlusion); !done)
+      return done.error();
   }
   progress.end();
   if (auto done = maps->commit(); !done) return done.error();
   report.warnings = maps->warnings();
-  if (field.lowest == field.highest) report.warnings.push_back(input.string() + ": every height is the same: the result is flat");
+  if (field.lowest == field.highest)
+    report.warnings.push_back(input.string() + ": every height is the same: the result is flat");
   return report;
 }
 

@@ -17,9 +17,9 @@ enum class BackEnd { Horizon, Rays };
 
 struct BakeSettings {
   HeightOptions height;
-  int bilateralRadius = 0;            // texels; 0: no filter
-  float bilateralThresholdTexels = 0; // 0: two steps of the file's bit depth (2/255 of the scale for 8 bits)
-  std::filesystem::path normalMap;    // empty: normals derived from the heights
+  int bilateralRadius = 0;             // texels; 0: no filter
+  float bilateralThresholdTexels = 0;  // 0: two steps of the file's bit depth (2/255 of the scale for 8 bits)
+  std::filesystem::path normalMap;     // empty: normals derived from the heights
   Green normalMapGreen = Green::Up;
   BackEnd backEnd = BackEnd::Horizon;
   HorizonSettings horizon;
@@ -37,7 +37,8 @@ struct BakeReport {
 };
 
 /// Everything from files to files. Errors: Input, Usage, Failed, Interrupted; none leaves a file behind.
-Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const BakeSettings& settings, Progress& progress);
+Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const BakeSettings& settings,
+                                   Progress& progress);
 
 struct BakedInMemory {
   HeightField field;

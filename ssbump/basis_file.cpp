@@ -18,9 +18,11 @@ Expected<std::vector<Vec3>> readBasis(const std::filesystem::path& file) {
     std::istringstream words(line);
     Vec3 v;
     std::string rest;
-    if (!(words >> v.x >> v.y >> v.z) || (words >> rest)) return inputError(place + "not three numbers; give x y z in (t, b, n)");
+    if (!(words >> v.x >> v.y >> v.z) || (words >> rest))
+      return inputError(place + "not three numbers; give x y z in (t, b, n)");
     const float length = glm::length(v);
-    if (!(std::abs(length - 1) < 1e-3f)) return inputError(place + "the vector's length is " + std::to_string(length) + "; give unit vectors");
+    if (!(std::abs(length - 1) < 1e-3f))
+      return inputError(place + "the vector's length is " + std::to_string(length) + "; give unit vectors");
     if (v.z <= 0) return inputError(place + "the vector does not point out of the surface (n must be above 0)");
     basis.push_back(v / length);
     if (basis.size() > 64) return inputError(place + "more than 64 vectors");

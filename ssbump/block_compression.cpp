@@ -72,18 +72,18 @@ Block fetchBlock(const Image& image, int bx, int by) {
 
 }  // namespace
 
-std::size_t blockBytes(BlockFormat format) {
-  return format == BlockFormat::Bc1 || format == BlockFormat::Bc4 ? 8 : 16;
-}
+std::size_t blockBytes(BlockFormat format) { return format == BlockFormat::Bc1 || format == BlockFormat::Bc4 ? 8 : 16; }
 
 std::vector<std::uint8_t> compressBlocks(const Image& image, BlockFormat format) {
-  const auto across = static_cast<std::size_t>((image.width + 3) / 4), down = static_cast<std::size_t>((image.height + 3) / 4);
+  const auto across = static_cast<std::size_t>((image.width + 3) / 4),
+             down = static_cast<std::size_t>((image.height + 3) / 4);
   const std::size_t bytes = blockBytes(format);
   std::vector<std::uint8_t> blocks(across * down * bytes);
   parallelFor(down, 1, [&](std::size_t first, std::size_t last) {
     for (std::size_t by = first; by < last; ++by)
       for (std::size_t bx = 0; bx < across; ++bx)
-        compressBlock(fetchBlock(image, static_cast<int>(bx), static_cast<int>(by)), format, &blocks[(by * across + bx) * bytes]);
+        compressBlock(fetchBlock(image, static_cast<int>(bx), static_cast<int>(by)), format,
+                      &blocks[(by * across + bx) * bytes]);
   });
   return blocks;
 }
@@ -100,7 +100,8 @@ Image decompressBlocks(std::span<const std::uint8_t> blocks, int width, int heig
         for (int i = 0; i < 16; ++i) {
           const int x = static_cast<int>(bx) * 4 + i % 4, y = static_cast<int>(by) * 4 + i / 4;
           if (x >= width || y >= height) continue;
-          for (int c = 0; c < 4; ++c) image.at(x, y)[c] = static_cast<float>(texels[static_cast<std::size_t>(i * 4 + c)]) / 255.0f;
+          for (int c = 0; c < 4; ++c)
+            image.at(x, y)[c] = static_cast<float>(texels[static_cast<std::size_t>(i * 4 + c)]) / 255.0f;
         }
       }
   });

@@ -35,7 +35,8 @@ Image panelGrid(std::span<const Image> panels, int columns) {
   const int rows = (static_cast<int>(panels.size()) + columns - 1) / columns;
   Image grid(columns * (w + kGap) + kGap, rows * (h + kGap) + kGap, 3, 0.25f);
   for (std::size_t i = 0; i < panels.size(); ++i) {
-    const int x0 = kGap + static_cast<int>(i) % columns * (w + kGap), y0 = kGap + static_cast<int>(i) / columns * (h + kGap);
+    const int x0 = kGap + static_cast<int>(i) % columns * (w + kGap),
+              y0 = kGap + static_cast<int>(i) / columns * (h + kGap);
     for (int y = 0; y < h; ++y) std::copy_n(panels[i].at(0, y), w * 3, grid.at(x0, y0 + y));
   }
   return grid;

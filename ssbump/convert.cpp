@@ -12,8 +12,10 @@ Expected<LoadedImage> readMap(const std::filesystem::path& file) {
   if (!loaded) return loaded.error();
   if (loaded->paletted) return inputError(file.string() + ": indexed colours; save it as RGB");
   if (loaded->image.channels < 3)
-    return inputError(file.string() + ": has " + std::to_string(loaded->image.channels) + " channel(s); an ssbump or normal map has three");
-  const auto channels = static_cast<std::size_t>(loaded->image.channels), width = static_cast<std::size_t>(loaded->image.width);
+    return inputError(file.string() + ": has " + std::to_string(loaded->image.channels) +
+                      " channel(s); an ssbump or normal map has three");
+  const auto channels = static_cast<std::size_t>(loaded->image.channels),
+             width = static_cast<std::size_t>(loaded->image.width);
   for (std::size_t i = 0; i < loaded->image.pixels.size(); ++i)
     if (!std::isfinite(loaded->image.pixels[i]))
       return inputError(file.string() + ": pixel (" + std::to_string(i / channels % width) + ", " +
@@ -24,7 +26,8 @@ Expected<LoadedImage> readMap(const std::filesystem::path& file) {
 void forEachTexel(Image& image, const std::function<Vec3(const Vec3&)>& map) {
   parallelFor(static_cast<std::size_t>(image.height), 16, [&](std::size_t first, std::size_t last) {
     for (std::size_t y = first; y < last; ++y)
-      for (int x = 0; x < image.width; ++x) image.setRgb(x, static_cast<int>(y), map(image.rgb(x, static_cast<int>(y))));
+      for (int x = 0; x < image.width; ++x)
+        image.setRgb(x, static_cast<int>(y), map(image.rgb(x, static_cast<int>(y))));
   });
 }
 
@@ -46,7 +49,8 @@ Expected<void> combine(Image& image, const Encoding& encoding, const MapForm& fo
   const auto second = [&](const std::filesystem::path& file) -> Expected<Image> {
     auto loaded = readMap(file);
     if (!loaded) return loaded.error();
-    if (!form.encoding) forEachTexel(loaded->image, [&](const Vec3& c) { return normalWeights(decodeNormal(c, form.green)); });
+    if (!form.encoding)
+      forEachTexel(loaded->image, [&](const Vec3& c) { return normalWeights(decodeNormal(c, form.green)); });
     return std::move(loaded->image);
   };
   if (!settings.crossFade.empty()) {
@@ -88,12 +92,14 @@ std::optional<MapForm> formFromMetadata(const LoadedImage& image) {
   return MapForm{Encoding{*c, *h}, Green::Up};
 }
 
-Expected<void> convertMap(const std::filesystem::path& input, const std::filesystem::path& output, const ConvertSettings& settings) {
+Expected<void> convertMap(const std::filesystem::path& input, const std::filesystem::path& output,
+                          const ConvertSettings& settings) {
   auto loaded = readMap(input);
   if (!loaded) return loaded.error();
   const auto form = settings.from ? settings.from : formFromMetadata(*loaded);
   if (!form)
-    return inputError(input.string() + ": nothing in the file says what it holds; give --from squared, linear, mod2x or normal");
+    return inputError(input.string() +
+                      ": nothing in the file says what it holds; give --from squared, linear, mod2x or normal");
   Image& image = loaded->image;
   const Encoding encoding = form->encoding.value_or(Encoding{});
   if (!form->encoding) forEachTexel(image, [&](const Vec3& c) { return normalWeights(decodeNormal(c, form->green)); });

@@ -18,7 +18,7 @@ struct MapForm {
 struct ConvertSettings {
   std::optional<MapForm> from;  // absent: as the file's metadata says
   MapForm to;
-  std::filesystem::path detail;     // an ssbump map in the form of the input, blended in evenly
+  std::filesystem::path detail;  // an ssbump map in the form of the input, blended in evenly
   float detailRepeats = 1;
   std::filesystem::path crossFade;  // a second map of the input's form and size
   float crossFadeAmount = 0.5f;     // 0: the input, 1: the second map
@@ -27,7 +27,8 @@ struct ConvertSettings {
 };
 
 /// Alpha passes through. Errors: Input (too few channels, not finite, unknown form), Usage, Failed.
-Expected<void> convertMap(const std::filesystem::path& input, const std::filesystem::path& output, const ConvertSettings& settings);
+Expected<void> convertMap(const std::filesystem::path& input, const std::filesystem::path& output,
+                          const ConvertSettings& settings);
 
 /// The form that a file's metadata names, if it names one.
 std::optional<MapForm> formFromMetadata(const LoadedImage& image);

@@ -41,8 +41,9 @@ std::vector<std::uint8_t> header(int width, int height, std::size_t levels, DdsF
              (levels > 1 ? kMipMapCount : 0);
   words[3] = h;
   words[4] = w;
-  words[5] = isBlock(format) ? static_cast<std::uint32_t>(blockBytes(blockFormat(format))) * ((w + 3) / 4) * ((h + 3) / 4)
-                             : w * (format == DdsFormat::Rgba8 ? 4u : 8u);
+  words[5] = isBlock(format)
+                 ? static_cast<std::uint32_t>(blockBytes(blockFormat(format))) * ((w + 3) / 4) * ((h + 3) / 4)
+                 : w * (format == DdsFormat::Rgba8 ? 4u : 8u);
   words[7] = static_cast<std::uint32_t>(levels);
   std::memcpy(&words[8], note.data(), std::min<std::size_t>(note.size(), 40));
   words[19] = 32;
@@ -59,7 +60,8 @@ std::vector<std::uint8_t> header(int width, int height, std::size_t levels, DdsF
     words[21] = fourCC(format == DdsFormat::Bc1 ? "DXT1" : format == DdsFormat::Bc3 ? "DXT5" : "DX10");
   }
   if (format == DdsFormat::Rgba16 || format == DdsFormat::Rgba16Half)
-    words.insert(words.end(), {format == DdsFormat::Rgba16 ? kDxgiRgba16Unorm : kDxgiRgba16Float, kDimensionTexture2d, 0, 1, 0});
+    words.insert(words.end(),
+                 {format == DdsFormat::Rgba16 ? kDxgiRgba16Unorm : kDxgiRgba16Float, kDimensionTexture2d, 0, 1, 0});
   std::vector<std::uint8_t> bytes(words.size() * 4);
   std::memcpy(bytes.data(), words.data(), bytes.size());
   return bytes;
@@ -86,7 +88,8 @@ std::vector<std::uint8_t> encodeLevel(const Image& image, DdsFormat format) {
       if (format == DdsFormat::Rgba8) {
         bytes[at] = static_cast<std::uint8_t>(std::lround(held * 255));
       } else {
-        const std::uint16_t word = format == DdsFormat::Rgba16 ? static_cast<std::uint16_t>(std::lround(held * 65535)) : toHalf(v);
+        const std::uint16_t word =
+            format == DdsFormat::Rgba16 ? static_cast<std::uint16_t>(std::lround(held * 65535)) : toHalf(v);
         std::memcpy(&bytes[at * 2], &word, 2);
       }
     }
@@ -96,17 +99,21 @@ std::vector<std::uint8_t> encodeLevel(const Image& image, DdsFormat format) {
 
 }  // namespace
 
-Expected<void> writeDds(const std::filesystem::path& file, std::span<const Image> levels, DdsFormat format, const std::string& note) {
+Expected<void> writeDds(const std::filesystem::path& file, std::span<const Image> levels, DdsFormat format,
+                        const std::string& note) {
   LUMEL_CHECK(!levels.empty());
   const std::string name = file.string();
   for (const Image& level : levels)
     for (float v : level.pixels)
       if (std::isnan(v) || (format == DdsFormat::Rgba16Half && std::abs(v) > 65504.0f))
         return failure(name + ": a value is not a number or beyond half's 65504");
-  const auto temporary = file.parent_path() / ("." + file.stem().string() + "." + std::to_string(getpid()) + ".part.dds");
+  const auto temporary =
+      file.parent_path() / ("." + file.stem().string() + "." + std::to_string(getpid()) + ".part.dds");
   std::FILE* out = std::fopen(temporary.c_str(), "wb");
   if (!out) return failure(name + ": cannot be written: " + std::strerror(errno));
-  const auto put = [&](const std::vector<std::uint8_t>& bytes) { return std::fwrite(bytes.data(), 1, bytes.size(), out) == bytes.size(); };
+  const auto put = [&](const std::vector<std::uint8_t>& bytes) {
+    return std::fwrite(bytes.data(), 1, bytes.size(), out) == bytes.size();
+  };
   bool good = put(header(levels[0].width, levels[0].height, levels.size(), format, note));
   for (const Image& level : levels) good = good && put(encodeLevel(level, format));
   const int problem = errno;

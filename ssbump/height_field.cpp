@@ -80,6 +80,13 @@ bool looksLikeNormalMap(const Image& image) {
 
 namespace {
 
+/// A table of greys is how some formats store grey: those are heights all the same.
+bool isGrey(const Image& image) {
+  for (std::size_t i = 0; image.channels >= 3 && i < image.pixels.size(); i += static_cast<std::size_t>(image.channels))
+    if (image.pixels[i] != image.pixels[i + 1] || image.pixels[i] != image.pixels[i + 2]) return false;
+  return true;
+}
+
 /// The chosen channel as one plane, in place of the interleaved pixels.
 void keepChannel(Image& image, int channel) {
   const auto channels = static_cast<std::size_t>(image.channels);
@@ -95,8 +102,9 @@ void keepChannel(Image& image, int channel) {
 
 }  // namespace
 
-Expected<HeightField> heightFieldFromImage(LoadedImage&& loaded, const HeightOptions& options, const std::string& name) {
-  if (loaded.paletted)
+Expected<HeightField> heightFieldFromImage(LoadedImage&& loaded, const HeightOptions& options,
+                                           const std::string& name) {
+  if (loaded.paletted && !isGrey(loaded.image))
     return inputError(name + ": indexed colours hold no heights; save it as 8- or 16-bit grey");
   if (options.channel.empty() && looksLikeNormalMap(loaded.image))
     return inputError(name + ": looks like a normal map, not heights; give it as --normal-map beside a height map, " +

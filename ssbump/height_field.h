@@ -15,11 +15,13 @@ namespace lumel::ssbump {
 struct HeightField {
   int width = 0;
   int height = 0;
-  bool wrap = true;            // tiles in both directions; else the surface ends at its outermost texels
-  std::vector<float> texels;   // width * height, in units of a texel's width
+  bool wrap = true;           // tiles in both directions; else the surface ends at its outermost texels
+  std::vector<float> texels;  // width * height, in units of a texel's width
   float lowest = 0, highest = 0;
 
-  const float* row(int y) const { return texels.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width); }
+  const float* row(int y) const {
+    return texels.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
+  }
   float* row(int y) { return texels.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width); }
   /// Height at any coordinates: wrapped, or clamped to the edge.
   float at(int x, int y) const;
@@ -28,10 +30,10 @@ struct HeightField {
 
 /// How a map's values become heights.
 struct HeightOptions {
-  std::string channel;        // a name ("A", "R"), an index, "luminance", or empty: the first
-  double scale = 5;           // height of a map value of 1: in texels, or with scaleIsPercent in % of the width
+  std::string channel;  // a name ("A", "R"), an index, "luminance", or empty: the first
+  double scale = 5;     // height of a map value of 1: in texels, or with scaleIsPercent in % of the width
   bool scaleIsPercent = true;
-  bool invert = false;        // 1 - value
+  bool invert = false;  // 1 - value
   bool wrap = true;
 };
 

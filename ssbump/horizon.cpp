@@ -9,10 +9,11 @@
 namespace lumel::ssbump {
 namespace {
 
-// Measured against 16k rays on fractal, brick and step fields of amplitudes 8 to 64. Sharp steps need the 12 texels (with
-// 4 their error doubles); 16 steps per octave gain a tenth over 12 for a fifth more time, 8 cost brick joints a third.
-constexpr double kExactReach = 12;   // up to here every edge that the slice crosses is looked at
-constexpr int kStepsPerOctave = 12;  // beyond kUnitReach: maxima over windows as long as the step
+// Measured against 16k rays on fractal, brick and step fields of amplitudes 8 to 64. Sharp steps need the 12 texels
+// (with 4 their error doubles); 16 steps per octave gain a tenth over 12 for a fifth more time, 8 cost brick joints a
+// third.
+constexpr double kExactReach = 12;               // up to here every edge that the slice crosses is looked at
+constexpr int kStepsPerOctave = 12;              // beyond kUnitReach: maxima over windows as long as the step
 constexpr int kUnitReach = 2 * kStepsPerOctave;  // up to here every crossing along the dominant axis
 // Where in its window a maximum is taken to be, from the centre, in lengths: a rising slope has it at the far end. A
 // quarter leaves a mean error below 5e-4 on fractals and steps of amplitude 24 (0: darker, 1/2: steps too bright).
@@ -90,7 +91,8 @@ Slice makeSlice(double phi, int reach, int levels, std::span<const Lobe> lobes) 
   addLines(uy, 1, 0, 0, exact);
   addLines(ux - uy, 1, 1, 0, exact);
   // Nearest first, so that a group ends where the next begins.
-  std::stable_sort(slice.lerps.begin(), slice.lerps.end(), [](const LerpStep& a, const LerpStep& b) { return a.inverseDistance > b.inverseDistance; });
+  std::stable_sort(slice.lerps.begin(), slice.lerps.end(),
+                   [](const LerpStep& a, const LerpStep& b) { return a.inverseDistance > b.inverseDistance; });
   const bool alongX = std::abs(ux) >= std::abs(uy);
   const double major = alongX ? ux : uy, minor = alongX ? uy : ux;
   addLines(major, alongX ? 0 : 1, alongX ? 1 : 0, exact, std::min<double>(kUnitReach / std::abs(major), reach));
@@ -100,15 +102,17 @@ Slice makeSlice(double phi, int reach, int levels, std::span<const Lobe> lobes) 
   for (int level = 1; level <= levels; ++level) {
     const int box = 1 << level;
     for (int j = 0; j < kStepsPerOctave; ++j) {
-      // The window covers the whole steps (n + j) box + 1 ... (n + j + 1) box along the dominant axis, about its centre;
-      // its highest texel may be anywhere in it.
+      // The window covers the whole steps (n + j) box + 1 ... (n + j + 1) box along the dominant axis, about its
+      // centre; its highest texel may be anywhere in it.
       const double centre = (kStepsPerOctave + j) * box + (box + 1) / 2.0;
       const double distance = (centre + kWindowEnd * box) / std::abs(major);
       if (centre / std::abs(major) > reach) break;
       // Windows of even width about p reach from p - width / 2: their centre lies half a texel lower.
       const int p = static_cast<int>(std::lround(std::copysign(centre, major) + 0.5));
-      const int m = static_cast<int>(std::lround(centre * minor / std::abs(major) + (MaxLevel::across(box) > 1 ? 0.5 : 0.0)));
-      slice.boxes.push_back({2 * level - (alongX ? 1 : 0), alongX ? p : m, alongX ? m : p, static_cast<float>(1 / distance)});
+      const int m =
+          static_cast<int>(std::lround(centre * minor / std::abs(major) + (MaxLevel::across(box) > 1 ? 0.5 : 0.0)));
+      slice.boxes.push_back(
+          {2 * level - (alongX ? 1 : 0), alongX ? p : m, alongX ? m : p, static_cast<float>(1 / distance)});
     }
   }
   slice.boxGroups = groupsOf(slice.boxes);
@@ -202,15 +206,18 @@ Image Horizon::occlusion(const TexelRect& rect, std::span<const Lobe> lobes) con
     for (const Slice& slice : slices)
       for (std::size_t y = first; y < last; ++y) {
         const int mapY = rect.y + static_cast<int>(y);
-        for (std::size_t c = 0; c < lobes.size(); ++c) sumRows[c] = &sums[(y - first) * rowSums + c * static_cast<std::size_t>(padded)];
+        for (std::size_t c = 0; c < lobes.size(); ++c)
+          sumRows[c] = &sums[(y - first) * rowSums + c * static_cast<std::size_t>(padded)];
         pointers.set(slice, levels, rect.x, mapY);
-        horizonRow(pointers.row(slice, levels[0].at(rect.x, mapY), rows_.field().highest, sumRows.data(), padded), settings_.simd);
+        horizonRow(pointers.row(slice, levels[0].at(rect.x, mapY), rows_.field().highest, sumRows.data(), padded),
+                   settings_.simd);
       }
     for (std::size_t y = first; y < last; ++y)
       for (std::size_t c = 0; c < lobes.size(); ++c) {
         const float* in = &sums[(y - first) * rowSums + c * static_cast<std::size_t>(padded)];
         float* o = out.pixels.data() + y * width * lobes.size() + c;
-        for (std::size_t x = 0; x < width; ++x) o[x * lobes.size()] = open[c] > 0 ? std::clamp(in[x] / open[c], 0.0f, 1.0f) : 1.0f;
+        for (std::size_t x = 0; x < width; ++x)
+          o[x * lobes.size()] = open[c] > 0 ? std::clamp(in[x] / open[c], 0.0f, 1.0f) : 1.0f;
       }
   });
   return out;

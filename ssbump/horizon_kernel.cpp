@@ -66,7 +66,8 @@ constexpr int kVectors = 4;  // independent chains that hide the latency of the 
 
 /// True where no lane of the block can find a higher slope at a distance of 1 / inverse or more.
 template <int Lanes>
-LUMEL_INLINE bool finished(const typename Simd<Lanes>::Floats* own, const typename Simd<Lanes>::Floats* slope, float highest, float inverse) {
+LUMEL_INLINE bool finished(const typename Simd<Lanes>::Floats* own, const typename Simd<Lanes>::Floats* slope,
+                           float highest, float inverse) {
   using Floats = typename Simd<Lanes>::Floats;
   Floats most = (highest - own[0]) * inverse - slope[0];
   for (int v = 1; v < kVectors; ++v) {
@@ -83,7 +84,8 @@ LUMEL_INLINE bool finished(const typename Simd<Lanes>::Floats* own, const typena
 }
 
 template <int Lanes>
-LUMEL_INLINE void climb(const HorizonRow& row, int x, const typename Simd<Lanes>::Floats* own, typename Simd<Lanes>::Floats* slope) {
+LUMEL_INLINE void climb(const HorizonRow& row, int x, const typename Simd<Lanes>::Floats* own,
+                        typename Simd<Lanes>::Floats* slope) {
   using S = Simd<Lanes>;
   using Floats = typename S::Floats;
   std::size_t s = 0;
@@ -136,7 +138,9 @@ LUMEL_INLINE void horizonRowBody(const HorizonRow& row) {
 void horizonRowBaseline(const HorizonRow& row) { horizonRowBody<4>(row); }
 #if defined(__x86_64__)
 __attribute__((target("avx2"))) void horizonRowAvx2(const HorizonRow& row) { horizonRowBody<8>(row); }
-__attribute__((target("avx512f,avx512vl,avx512dq"))) void horizonRowAvx512(const HorizonRow& row) { horizonRowBody<16>(row); }
+__attribute__((target("avx512f,avx512vl,avx512dq"))) void horizonRowAvx512(const HorizonRow& row) {
+  horizonRowBody<16>(row);
+}
 #endif
 
 }  // namespace

@@ -19,7 +19,7 @@ struct StepGroup {
 
 /// One azimuth of one row. Slopes are (height at the step - own height) * inverse distance.
 struct HorizonRow {
-  const float* own = nullptr;        // heights of the row's texels
+  const float* own = nullptr;  // heights of the row's texels
   // Steps between two vertices: height = near[s] + fraction[s] * (far[s] - near[s]).
   const float* const* lerpA = nullptr;
   const float* const* lerpB = nullptr;
@@ -36,8 +36,8 @@ struct HorizonRow {
 
   const LobeSlice* slices = nullptr;  // one per channel
   std::size_t channels = 0;
-  float* const* sums = nullptr;       // one row per channel: += F(horizon slope)
-  int width = 0;                      // a multiple of kHorizonBlock
+  float* const* sums = nullptr;  // one row per channel: += F(horizon slope)
+  int width = 0;                 // a multiple of kHorizonBlock
 };
 
 enum class SimdLevel { Baseline, Avx2, Avx512 };

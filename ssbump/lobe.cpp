@@ -44,7 +44,8 @@ LobeSlice::LobeSlice(const Lobe& lobe, double phi) {
   c = static_cast<float>(cd);
   // a cos e + c sin e = r cos(e - e0): the lobe covers the elevations within `half` of e0.
   const double r = std::hypot(ad, cd);
-  const double least = lobe.shape == LobeShape::Cone ? std::max(0.0, std::cos(lobe.coneOpeningDegrees * std::numbers::pi / 360)) : 0.0;
+  const double least =
+      lobe.shape == LobeShape::Cone ? std::max(0.0, std::cos(lobe.coneOpeningDegrees * std::numbers::pi / 360)) : 0.0;
   if (r <= least || r < 1e-12) return;  // the slice misses the lobe: F = 0
   const double e0 = std::atan2(cd, ad);
   const double half = std::acos(least / r);

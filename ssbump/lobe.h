@@ -28,7 +28,8 @@ std::vector<Lobe> rnmLobes(LobeShape shape = LobeShape::Hemisphere, float coneOp
 /// Cosine-weighted ambient occlusion.
 inline Lobe ambientLobe() { return {}; }
 
-/// The weight of direction w (unit, tangent space) in the lobe: max(0, w.axis), or 0 outside the cone or below the base.
+/// The weight of direction w (unit, tangent space) in the lobe: max(0, w.axis), or 0 outside the cone or below the
+/// base.
 float lobeWeight(const Lobe& lobe, const Vec3& w);
 
 /// The lobe's integral over the azimuth slice phi, above a horizon of slope t >= 0:

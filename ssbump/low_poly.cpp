@@ -45,7 +45,8 @@ Expected<FlatMesh> flatten(const Scene& scene, int uvSet, const std::string& wha
   for (const Instance& instance : scene.instances)
     for (const Primitive& primitive : scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives) {
       if (uvSet >= static_cast<int>(primitive.uvSets.size()))
-        return inputError(what + ": " + primitive.name + " has no UV set " + std::to_string(uvSet) + "; unwrap it or choose another with --uv-set");
+        return inputError(what + ": " + primitive.name + " has no UV set " + std::to_string(uvSet) +
+                          "; unwrap it or choose another with --uv-set");
       if (!append(mesh, primitive, instance.worldFromObject, uvSet, hasTangents))
         return inputError(what + ": " + primitive.name + ": a position or UV is not finite; repair the mesh");
     }
@@ -80,7 +81,8 @@ std::vector<SurfaceTexel> rasterizeCharts(const FlatMesh& mesh, int width, int h
         const float wd = ((b.x - a.x) * (p.y - a.y) - (p.x - a.x) * (b.y - a.y)) / det;
         const float wa = 1 - wb - wd;
         // Centres on a shared edge belong to the first triangle that claims them.
-        SurfaceTexel& texel = texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
+        SurfaceTexel& texel =
+            texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)];
         if (texel.covered || wa < -1e-6f || wb < -1e-6f || wd < -1e-6f) continue;
         texel.covered = true;
         texel.p = wa * mesh.positions[c] + wb * mesh.positions[c + 1] + wd * mesh.positions[c + 2];

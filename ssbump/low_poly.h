@@ -20,8 +20,8 @@ struct FlatMesh {
   float diagonal() const { return glm::length(highest - lowest); }
 };
 
-/// uvSet < 0: positions and normals only. Tangents are the mesh's own, else from the UVs (scene/tangents.h): t along u, b
-/// up the image. Errors: Input (no triangles, no such UV set, not finite).
+/// uvSet < 0: positions and normals only. Tangents are the mesh's own, else from the UVs (scene/tangents.h): t along u,
+/// b up the image. Errors: Input (no triangles, no such UV set, not finite).
 Expected<FlatMesh> flatten(const Scene& scene, int uvSet, const std::string& what);
 
 struct SurfaceTexel {

@@ -58,7 +58,8 @@ Expected<MapSet> MapSet::open(const MapSettings& settings, int width, int height
   set.alpha_ = std::move(alpha);
   const bool rnm = settings.basis.empty();
   set.basisSize_ = rnm ? 3 : settings.basis.size();
-  if (!rnm && settings.encoding.hand == Hand::Left) return usageError("--hand left is a swap of the RNM basis's channels; it does not go with --basis");
+  if (!rnm && settings.encoding.hand == Hand::Left)
+    return usageError("--hand left is a swap of the RNM basis's channels; it does not go with --basis");
   if (!rnm && set.basisSize_ != 3 && (!settings.detail.empty() || !settings.files.recovered.empty()))
     return usageError("--detail and --save-recovered need the three RNM vectors; leave out --basis");
   if (!settings.mask.empty()) {
@@ -83,7 +84,8 @@ Expected<MapSet> MapSet::open(const MapSettings& settings, int width, int height
   for (const auto& [key, value] : encodingMetadata(settings.encoding)) metadata[key] = value;
   if (!rnm) {
     std::string text;
-    for (const Vec3& v : basis) text += std::to_string(v.x) + " " + std::to_string(v.y) + " " + std::to_string(v.z) + "; ";
+    for (const Vec3& v : basis)
+      text += std::to_string(v.x) + " " + std::to_string(v.y) + " " + std::to_string(v.z) + "; ";
     metadata["lumel:ssbump:basis"] = text;
   }
   metadata["lumel:green"] = settings.green == Green::Up ? "up" : "down";
@@ -104,7 +106,8 @@ Expected<MapSet> MapSet::open(const MapSettings& settings, int width, int height
   for (const auto& opened :
        {open(f.ssbump, set.basisSize_, hasAlpha, MapKind::Weights, "ssbump", set.ssbump_),
         open(f.weights, set.basisSize_, false, MapKind::Weights, "weights without occlusion", set.weights_),
-        open(f.occlusion, set.basisSize_, false, MapKind::Weights, "visibility around each basis vector", set.occlusion_),
+        open(f.occlusion, set.basisSize_, false, MapKind::Weights, "visibility around each basis vector",
+             set.occlusion_),
         open(f.ambient, 1, false, MapKind::Weights, "cosine-weighted visibility", set.ambient_),
         open(f.normal, 3, false, MapKind::Normals, "normal map", set.normal_),
         open(f.recovered, 3, false, MapKind::Normals, "normal map recovered from the ssbump map", set.recovered_)})
@@ -156,7 +159,9 @@ Expected<void> MapSet::write(const Image& normals, const Image& occlusion) {
   LUMEL_CHECK(static_cast<std::size_t>(occlusion.channels) == lobes_.size());
   Image ssbump = compose(normals, occlusion, true);
   modulate(ssbump);
-  const auto put = [](std::optional<MapWriter>& writer, const auto& make) { return writer ? writer->write(make()) : Expected<void>(); };
+  const auto put = [](std::optional<MapWriter>& writer, const auto& make) {
+    return writer ? writer->write(make()) : Expected<void>();
+  };
   const auto perTexel = [&](int channels, const auto& value) {
     Image out(normals.width, normals.height, channels);
     forEachTexel(out, [&](int x, int y) { value(x, y, out.at(x, y)); });
@@ -167,17 +172,33 @@ Expected<void> MapSet::write(const Image& normals, const Image& occlusion) {
     std::copy_n(&stored.x, 3, out);
   };
   if (auto r = put(weights_, [&] { return compose(normals, occlusion, false); }); !r) return r;
-  if (auto r = put(occlusion_, [&] {
-        return perTexel(static_cast<int>(basisSize_), [&](int x, int y, float* out) { std::copy_n(occlusion.at(x, y), basisSize_, out); });
-      }); !r) return r;
-  if (auto r = put(ambient_, [&] { return perTexel(1, [&](int x, int y, float* out) { *out = occlusion.at(x, y)[basisSize_]; }); }); !r) return r;
-  if (auto r = put(normal_, [&] { return perTexel(3, [&](int x, int y, float* out) { setNormal(normals.rgb(x, y), out); }); }); !r) return r;
-  if (auto r = put(recovered_, [&] {
-        return perTexel(3, [&](int x, int y, float* out) {
-          const Vec3 s = convert(ssbump.rgb(x, y), settings_.encoding, {settings_.encoding.convention, Hand::Right});
-          setNormal(recoveredNormal(s, settings_.encoding.convention), out);
-        });
-      }); !r) return r;
+  if (auto r = put(occlusion_,
+                   [&] {
+                     return perTexel(static_cast<int>(basisSize_), [&](int x, int y, float* out) {
+                       std::copy_n(occlusion.at(x, y), basisSize_, out);
+                     });
+                   });
+      !r)
+    return r;
+  if (auto r =
+          put(ambient_,
+              [&] { return perTexel(1, [&](int x, int y, float* out) { *out = occlusion.at(x, y)[basisSize_]; }); });
+      !r)
+    return r;
+  if (auto r = put(normal_,
+                   [&] { return perTexel(3, [&](int x, int y, float* out) { setNormal(normals.rgb(x, y), out); }); });
+      !r)
+    return r;
+  if (auto r = put(recovered_,
+                   [&] {
+                     return perTexel(3, [&](int x, int y, float* out) {
+                       const Vec3 s =
+                           convert(ssbump.rgb(x, y), settings_.encoding, {settings_.encoding.convention, Hand::Right});
+                       setNormal(recoveredNormal(s, settings_.encoding.convention), out);
+                     });
+                   });
+      !r)
+    return r;
   addAlpha(ssbump);
   row_ += normals.height;
   return ssbump_ ? ssbump_->write(ssbump) : Expected<void>();

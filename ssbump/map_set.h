@@ -26,8 +26,8 @@ struct MapSettings {
   MapFiles files;
   MapOptions options;
   Encoding encoding;
-  Green green = Green::Up;    // of written normal maps
-  std::vector<Vec3> basis;    // empty: the three RNM vectors
+  Green green = Green::Up;  // of written normal maps
+  std::vector<Vec3> basis;  // empty: the three RNM vectors
   LobeShape lobe = LobeShape::Hemisphere;
   float coneOpeningDegrees = 120;
   std::filesystem::path albedo;  // sRGB unless a float file; its luminance multiplies the ssbump map

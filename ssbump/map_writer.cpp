@@ -31,14 +31,16 @@ DdsFormat ddsFormatFor(const MapOptions& options) {
   }
 }
 
-Expected<void> checkFormat(const std::filesystem::path& file, const std::string& extension, int channels, PixelFormat format) {
+Expected<void> checkFormat(const std::filesystem::path& file, const std::string& extension, int channels,
+                           PixelFormat format) {
   const std::string name = file.string();
   if (channels > 4 && extension != ".exr" && extension != ".tif" && extension != ".tiff")
     return usageError(name + ": " + std::to_string(channels) + " channels need .exr or .tif");
   const bool isFloat = format == PixelFormat::Half || format == PixelFormat::Float;
   if (isFloat && (extension == ".png" || extension == ".tga"))
     return usageError(name + ": holds no floats; use --bits 8 or 16, or .exr");
-  if (format == PixelFormat::U16 && extension == ".tga") return usageError(name + ": TGA holds 8 bits; use .png or --bits 8");
+  if (format == PixelFormat::U16 && extension == ".tga")
+    return usageError(name + ": TGA holds 8 bits; use .png or --bits 8");
   if (!isFloat && extension == ".exr") return usageError(name + ": EXR holds floats; use --bits half or float");
   return {};
 }
@@ -55,8 +57,8 @@ std::filesystem::path mipName(const std::filesystem::path& file, std::size_t lev
 
 }  // namespace
 
-Expected<MapWriter> MapWriter::open(const std::filesystem::path& file, int width, int height, int channels, MapKind kind,
-                                    const MapOptions& options, std::vector<std::string> channelNames,
+Expected<MapWriter> MapWriter::open(const std::filesystem::path& file, int width, int height, int channels,
+                                    MapKind kind, const MapOptions& options, std::vector<std::string> channelNames,
                                     std::map<std::string, std::string> metadata) {
   const std::string extension = extensionOf(file);
   MapWriter writer;
@@ -68,10 +70,12 @@ Expected<MapWriter> MapWriter::open(const std::filesystem::path& file, int width
   writer.options_ = options;
   writer.write_ = {formatFor(extension, options), std::move(channelNames), std::move(metadata)};
   if (extension == ".dds") {
-    if (channels > 4) return usageError(file.string() + ": " + std::to_string(channels) + " channels need .exr or .tif");
+    if (channels > 4)
+      return usageError(file.string() + ": " + std::to_string(channels) + " channels need .exr or .tif");
     std::error_code ec;
     const auto folder = file.parent_path().empty() ? std::filesystem::path(".") : file.parent_path();
-    if (!std::filesystem::is_directory(folder, ec)) return failure(file.string() + ": cannot be written: no such folder");
+    if (!std::filesystem::is_directory(folder, ec))
+      return failure(file.string() + ": cannot be written: no such folder");
     writer.options_.mips = true;
   } else {
     if (auto good = checkFormat(file, extension, channels, writer.write_.format); !good) return good.error();

@@ -23,7 +23,8 @@ void maxRow(const float* row, int width, bool wrap, int x0, std::span<float> out
     }
     if (x >= width) return;
     const int run = std::min(count - i, width - x);
-    for (int k = 0; k < run; ++k) out[static_cast<std::size_t>(i + k)] = std::max(out[static_cast<std::size_t>(i + k)], row[x + k]);
+    for (int k = 0; k < run; ++k)
+      out[static_cast<std::size_t>(i + k)] = std::max(out[static_cast<std::size_t>(i + k)], row[x + k]);
     i += run;
   }
 }
@@ -41,7 +42,8 @@ RowMaxima::RowMaxima(const HeightField& field) : field_(field) {
         float* out = &group[r * width];
         const std::size_t parts = first ? std::size_t{1} << kFirstShift : 2;
         for (std::size_t part = 0; part < parts; ++part) {
-          const float* in = first ? field.row(static_cast<int>(r * parts + part)) : &groups_.back()[(r * parts + part) * width];
+          const float* in =
+              first ? field.row(static_cast<int>(r * parts + part)) : &groups_.back()[(r * parts + part) * width];
           if (part == 0)
             std::copy(in, in + width, out);
           else
@@ -67,13 +69,16 @@ void RowMaxima::band(int y0, int y1, int x0, std::span<float> out) const {
   while (y0 < y1) {
     const int y = field_.wrap ? wrapIndex(y0, height) : y0;
     int shift = kFirstShift + static_cast<int>(groups_.size()) - 1;
-    while (shift >= kFirstShift && ((y & ((1 << shift) - 1)) != 0 || y + (1 << shift) > height || y0 + (1 << shift) > y1)) --shift;
+    while (shift >= kFirstShift &&
+           ((y & ((1 << shift) - 1)) != 0 || y + (1 << shift) > height || y0 + (1 << shift) > y1))
+      --shift;
     if (shift < kFirstShift) {
       maxRow(field_.row(y), width, field_.wrap, x0, out);
       ++y0;
     } else {
       const auto& group = groups_[static_cast<std::size_t>(shift - kFirstShift)];
-      maxRow(&group[static_cast<std::size_t>(y >> shift) * static_cast<std::size_t>(width)], width, field_.wrap, x0, out);
+      maxRow(&group[static_cast<std::size_t>(y >> shift) * static_cast<std::size_t>(width)], width, field_.wrap, x0,
+             out);
       y0 += 1 << shift;
     }
   }
@@ -83,7 +88,8 @@ MaxLevel::MaxLevel(const RowMaxima& rows, const TexelRect& tile, int length, Alo
     : stride_(std::max(1, along == Along::X ? across(length) / 2 : length / 4)),
       x0_(tile.x - range),
       width_(tile.width + 2 * range + padding) {
-  const int windowX = along == Along::X ? length : across(length), windowY = along == Along::X ? across(length) : length;
+  const int windowX = along == Along::X ? length : across(length),
+            windowY = along == Along::X ? across(length) : length;
   firstRow_ = floorDiv(tile.y - range, stride_);
   const int lastRow = floorDiv(tile.y + tile.height + range + stride_, stride_);
   const auto count = static_cast<std::size_t>(lastRow - firstRow_ + 1);

@@ -35,11 +35,11 @@ class RowMaxima {
 /// Which way a level's windows are long.
 enum class Along { X, Y };
 
-/// One level around a tile: entry (x, y) is the maximum over a window of `length` texels along one axis and a quarter of
-/// that across, [x - wx/2, x + wx - wx/2) and y likewise. Thin windows: over a random field a strip beside the slice has
-/// the statistics of the slice itself, a square would reach for what lies beside it; and joints that run along an axis
-/// stay open. Every column is stored, and every stride-th row, at map rows that are multiples of stride: a tile's result
-/// does not depend on where tiles begin.
+/// One level around a tile: entry (x, y) is the maximum over a window of `length` texels along one axis and a quarter
+/// of that across, [x - wx/2, x + wx - wx/2) and y likewise. Thin windows: over a random field a strip beside the slice
+/// has the statistics of the slice itself, a square would reach for what lies beside it; and joints that run along an
+/// axis stay open. Every column is stored, and every stride-th row, at map rows that are multiples of stride: a tile's
+/// result does not depend on where tiles begin.
 class MaxLevel {
  public:
   /// Covers offsets up to `range` texels from the tile, and `padding` more columns on the right. `length` is 1 (the

@@ -5,10 +5,12 @@
 
 namespace lumel::ssbump {
 
-Expected<BakeReport> bakeMesh(const std::filesystem::path& high, const std::filesystem::path& low, const MeshSettings& settings,
-                              Progress& progress) {
+Expected<BakeReport> bakeMesh(const std::filesystem::path& high, const std::filesystem::path& low,
+                              const MeshSettings& settings, Progress& progress) {
   const auto started = std::chrono::steady_clock::now();
-  const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count(); };
+  const auto seconds = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  };
   auto highScene = loadScene(high);
   if (!highScene) return highScene.error();
   std::optional<Scene> lowScene;
@@ -18,7 +20,8 @@ Expected<BakeReport> bakeMesh(const std::filesystem::path& high, const std::file
     lowScene = std::move(*loaded);
   }
   auto maps = MapSet::open(settings.maps, settings.width, settings.height, {},
-                           {{"lumel:occlusion", "rays, " + std::to_string(settings.rays.count) + " per texel, against " + high.filename().string()},
+                           {{"lumel:occlusion", "rays, " + std::to_string(settings.rays.count) +
+                                                    " per texel, against " + high.filename().string()},
                             {"lumel:wrap", low.empty() && settings.wrap ? "yes" : "no"}});
   if (!maps) return maps.error();
   BakeReport report;

@@ -25,10 +25,10 @@ struct Target {
 
 EmbreeGeometry triangleGeometry(RTCDevice device, const FlatMesh& mesh) {
   EmbreeGeometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
-  auto* positions = static_cast<float*>(rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                                12, mesh.positions.size()));
-  auto* indices = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                                      12, mesh.triangles()));
+  auto* positions = static_cast<float*>(
+      rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size()));
+  auto* indices = static_cast<std::uint32_t*>(
+      rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangles()));
   if (!positions || !indices) return {};
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     for (int c = 0; c < 3; ++c) positions[i * 3 + static_cast<std::size_t>(c)] = mesh.positions[i][c];
@@ -46,7 +46,8 @@ Expected<Target> buildTarget(FlatMesh mesh, Vec2 period) {
   target.device = std::move(*device);
   target.single = newEmbreeScene(target.device.get());
   const EmbreeGeometry geometry = triangleGeometry(target.device.get(), target.mesh);
-  if (!geometry) return failure("high-poly mesh: not enough memory for " + std::to_string(target.mesh.triangles()) + " triangles");
+  if (!geometry)
+    return failure("high-poly mesh: not enough memory for " + std::to_string(target.mesh.triangles()) + " triangles");
   rtcAttachGeometry(target.single.get(), geometry.get());
   if (auto done = commitScene(target.device.get(), target.single.get(), "high-poly mesh"); !done) return done.error();
   if (period.x <= 0) return target;
@@ -59,12 +60,14 @@ Expected<Target> buildTarget(FlatMesh mesh, Vec2 period) {
     for (int i = -around; i <= around; ++i) {
       EmbreeGeometry instance(rtcNewGeometry(target.device.get(), RTC_GEOMETRY_TYPE_INSTANCE));
       rtcSetGeometryInstancedScene(instance.get(), target.single.get());
-      const std::array<float, 12> transform{1, 0, 0, 0, 1, 0, 0, 0, 1, static_cast<float>(i) * period.x, 0, static_cast<float>(j) * period.y};
+      const std::array<float, 12> transform{
+          1, 0, 0, 0, 1, 0, 0, 0, 1, static_cast<float>(i) * period.x, 0, static_cast<float>(j) * period.y};
       rtcSetGeometryTransform(instance.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, transform.data());
       rtcCommitGeometry(instance.get());
       rtcAttachGeometry(target.repeated.get(), instance.get());
     }
-  if (auto done = commitScene(target.device.get(), target.repeated.get(), "repeated high-poly mesh"); !done) return done.error();
+  if (auto done = commitScene(target.device.get(), target.repeated.get(), "repeated high-poly mesh"); !done)
+    return done.error();
   return target;
 }
 
@@ -75,7 +78,8 @@ std::vector<SurfaceTexel> tileTexels(const MeshSettings& s, Vec2 centre, Vec2 si
     for (int column = 0; column < s.width; ++column) {
       const float u = (static_cast<float>(column) + 0.5f) / static_cast<float>(s.width) - 0.5f;
       const float v = (static_cast<float>(row) + 0.5f) / static_cast<float>(s.height) - 0.5f;
-      texels.push_back({true, Vec3(centre.x + u * size.x, y, centre.y + v * size.y), Frame{{1, 0, 0}, {0, 0, -1}, {0, 1, 0}}});
+      texels.push_back(
+          {true, Vec3(centre.x + u * size.x, y, centre.y + v * size.y), Frame{{1, 0, 0}, {0, 0, -1}, {0, 1, 0}}});
     }
   return texels;
 }
@@ -108,24 +112,27 @@ Found projectFrom(const Target& target, const Vec3& origin, const Vec3& directio
   return found;
 }
 
-/// The mesh's outermost surface along the texel's normal, from `front` above to `back` below. A ray that slips between a
-/// mesh's border and its own repeat, or past a border that it should meet, is moved by a hundred-thousandth of the mesh.
+/// The mesh's outermost surface along the texel's normal, from `front` above to `back` below. A ray that slips between
+/// a mesh's border and its own repeat, or past a border that it should meet, is moved by a hundred-thousandth of the
+/// mesh.
 Found project(const Target& target, const SurfaceTexel& texel, float front, float back) {
   const Vec3 origin = texel.p + texel.frame.n * front;
   const float nudge = 1e-5f * target.mesh.diagonal();
   for (const auto& [dt, db] : {std::pair{0.0f, 0.0f}, {1.0f, 1.0f}, {-1.0f, -1.0f}, {1.0f, -1.0f}, {-1.0f, 1.0f}}) {
-    const Found found = projectFrom(target, origin + nudge * (dt * texel.frame.t + db * texel.frame.b), -texel.frame.n, front + back);
+    const Found found =
+        projectFrom(target, origin + nudge * (dt * texel.frame.t + db * texel.frame.b), -texel.frame.n, front + back);
     if (found.hit) return found;
   }
   return {};
 }
 
 /// Gathers one texel: rays in packets of sixteen from one point.
-void gatherTexel(const Target& target, const SurfaceTexel& texel, const Found& found, const HemisphereSamples& samples, int count,
-                 std::uint64_t key, std::span<const Lobe> lobes, std::span<float> out) {
+void gatherTexel(const Target& target, const SurfaceTexel& texel, const Found& found, const HemisphereSamples& samples,
+                 int count, std::uint64_t key, std::span<const Lobe> lobes, std::span<float> out) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  const float magnitude = std::max({std::abs(found.p.x), std::abs(found.p.y), std::abs(found.p.z), 1e-3f * target.mesh.diagonal()});
+  const float magnitude =
+      std::max({std::abs(found.p.x), std::abs(found.p.y), std::abs(found.p.z), 1e-3f * target.mesh.diagonal()});
   const Vec3 origin = found.p + found.geometricNormal * (magnitude * 4e-6f);
   std::vector<double> seen(lobes.size()), all(lobes.size());
   for (int s = 0; s < count; s += static_cast<int>(kPacket)) {
@@ -201,7 +208,8 @@ Expected<MeshTexels> gatherMesh(const Scene& high, const Scene* low, const MeshS
   auto target = buildTarget(std::move(*flat), period);
   if (!target) return target.error();
 
-  MeshTexels out{Image(s.width, s.height, 3), Image(s.width, s.height, static_cast<int>(lobes.size()), 1.0f), Image(s.width, s.height, 1)};
+  MeshTexels out{Image(s.width, s.height, 3), Image(s.width, s.height, static_cast<int>(lobes.size()), 1.0f),
+                 Image(s.width, s.height, 1)};
   const HemisphereSamples samples(s.rays.sampling, s.rays.count, s.rays.seed);
   progress.begin("rays against the mesh", surface.size());
   parallelFor(surface.size(), 256, [&](std::size_t first, std::size_t last) {

@@ -78,8 +78,10 @@ Image halve(const Image& image, MipFilter filter, bool wrap) {
         for (std::size_t c = 0; c < channels; ++c) {
           float sum = 0;
           for (std::size_t k = 0; k < taps.weights.size(); ++k)
-            sum += taps.weights[k] *
-                   column[static_cast<std::size_t>(edge(taps.first + static_cast<int>(k), image.width, wrap)) * channels + c];
+            sum +=
+                taps.weights[k] *
+                column[static_cast<std::size_t>(edge(taps.first + static_cast<int>(k), image.width, wrap)) * channels +
+                       c];
           o[c] = filter == MipFilter::Kaiser ? std::clamp(sum, 0.0f, 1.0f) : sum;
         }
       }

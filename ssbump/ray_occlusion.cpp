@@ -71,14 +71,17 @@ class Packet {
   }
 
  private:
-  float offset() const { return kOffsetTexels * std::max(1.0f, static_cast<float>(std::max(field_.width, field_.height)) / 2048); }
+  float offset() const {
+    return kOffsetTexels * std::max(1.0f, static_cast<float>(std::max(field_.width, field_.height)) / 2048);
+  }
 
   float leavesTile(std::size_t i) const {
     const auto axis = [&](float origin, float direction, int size) {
       if (std::abs(direction) < 1e-12f) return 1e30f;
       return ((direction > 0 ? static_cast<float>(size) : 0.0f) - origin) / direction;
     };
-    return std::min(axis(rays_.org_x[i], rays_.dir_x[i], field_.width), axis(rays_.org_y[i], rays_.dir_y[i], field_.height));
+    return std::min(axis(rays_.org_x[i], rays_.dir_x[i], field_.width),
+                    axis(rays_.org_y[i], rays_.dir_y[i], field_.height));
   }
 
   /// The ray goes on from where it left, on the other side: its origin moves by a whole tile, its parameter does not.
@@ -86,8 +89,10 @@ class Packet {
     const auto shift = [&](float& origin, float direction, int size) {
       const auto s = static_cast<float>(size);
       const float at = origin + direction * leaves;
-      if (direction > 0 && at >= s - 0.5f * offset()) origin -= s;
-      else if (direction < 0 && at <= 0.5f * offset()) origin += s;
+      if (direction > 0 && at >= s - 0.5f * offset())
+        origin -= s;
+      else if (direction < 0 && at <= 0.5f * offset())
+        origin += s;
     };
     shift(rays_.org_x[i], rays_.dir_x[i], field_.width);
     shift(rays_.org_y[i], rays_.dir_y[i], field_.height);
@@ -120,10 +125,11 @@ Expected<RayOcclusion> RayOcclusion::build(const HeightField& field, const RaySe
   const auto cellCount = static_cast<std::size_t>(columns - 1) * static_cast<std::size_t>(rows - 1);
   auto* positions = static_cast<float*>(rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0,
                                                                 RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertexCount));
-  auto* indices = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                                      3 * sizeof(std::uint32_t), 2 * cellCount));
-  if (cellCount > 0 && (!positions || !indices)) return failure("height field of " + std::to_string(field.width) + "x" +
-                                                                std::to_string(field.height) + ": not enough memory for rays");
+  auto* indices = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
+      geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), 2 * cellCount));
+  if (cellCount > 0 && (!positions || !indices))
+    return failure("height field of " + std::to_string(field.width) + "x" + std::to_string(field.height) +
+                   ": not enough memory for rays");
   if (cellCount > 0) {
     for (int y = 0; y < rows; ++y)
       for (int x = 0; x < columns; ++x) {
@@ -135,7 +141,8 @@ Expected<RayOcclusion> RayOcclusion::build(const HeightField& field, const RaySe
     for (std::uint32_t y = 0; y + 1 < static_cast<std::uint32_t>(rows); ++y)
       for (std::uint32_t x = 0; x + 1 < stride; ++x) {
         const std::uint32_t corner = y * stride + x;
-        for (std::uint32_t v : {corner, corner + stride + 1, corner + 1, corner, corner + stride, corner + stride + 1}) *indices++ = v;
+        for (std::uint32_t v : {corner, corner + stride + 1, corner + 1, corner, corner + stride, corner + stride + 1})
+          *indices++ = v;
       }
     rtcCommitGeometry(geometry.get());
     rtcAttachGeometry(self.scene_.get(), geometry.get());
@@ -155,12 +162,14 @@ Image RayOcclusion::occlusion(const TexelRect& rect, std::span<const Lobe> lobes
   return out;
 }
 
-std::vector<float> RayOcclusion::occlusionAt(std::span<const std::pair<int, int>> texels, std::span<const Lobe> lobes) const {
+std::vector<float> RayOcclusion::occlusionAt(std::span<const std::pair<int, int>> texels,
+                                             std::span<const Lobe> lobes) const {
   const HemisphereSamples samples(settings_.sampling, settings_.count, settings_.seed);
   const std::size_t channels = lobes.size();
   std::vector<float> out(texels.size() * channels);
   parallelFor((texels.size() + kPacket - 1) / kPacket, 16, [&](std::size_t first, std::size_t last) {
-    Packet packet(*field_, scene_.get(), settings_.sampling == RaySampling::Stratified, static_cast<float>(settings_.reach));
+    Packet packet(*field_, scene_.get(), settings_.sampling == RaySampling::Stratified,
+                  static_cast<float>(settings_.reach));
     std::vector<double> seen(kPacket * channels), all(kPacket * channels);
     for (std::size_t p = first; p < last; ++p) {
       std::fill(seen.begin(), seen.end(), 0.0);
@@ -172,7 +181,8 @@ std::vector<float> RayOcclusion::occlusionAt(std::span<const std::pair<int, int>
           packet.disable(i);
           if (i >= lanes) continue;
           const auto [x, y] = texels[p * kPacket + i];
-          const auto key = static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(field_->width) + static_cast<std::uint64_t>(x);
+          const auto key =
+              static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(field_->width) + static_cast<std::uint64_t>(x);
           directions[i] = samples.direction(key, s);
           packet.set(i, static_cast<float>(x), static_cast<float>(y), field_->at(x, y), directions[i]);
         }

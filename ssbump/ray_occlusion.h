@@ -18,7 +18,7 @@ struct RaySettings {
   int count = 300;  // per texel, all lobes share them
   RaySampling sampling = RaySampling::Stratified;
   std::uint32_t seed = 1;
-  int reach = 0;    // texels beyond which nothing occludes; 0 = automaticReach
+  int reach = 0;  // texels beyond which nothing occludes; 0 = automaticReach
 };
 
 class RayOcclusion {

@@ -68,7 +68,8 @@ Vec3 HemisphereSamples::direction(std::uint64_t texelKey, int index) const {
     u = unitFloat(owen(reverseBits(shuffled), static_cast<std::uint32_t>(seeds)));
     v = unitFloat(owen(sobolSecond(shuffled), static_cast<std::uint32_t>(seeds >> 32)));
   } else {
-    const std::uint64_t bits = mix(mix(texelKey + (static_cast<std::uint64_t>(seed_) << 40)) + static_cast<std::uint64_t>(index));
+    const std::uint64_t bits =
+        mix(mix(texelKey + (static_cast<std::uint64_t>(seed_) << 40)) + static_cast<std::uint64_t>(index));
     u = unitFloat(static_cast<std::uint32_t>(bits));
     v = unitFloat(static_cast<std::uint32_t>(bits >> 32));
     if (sampling_ == RaySampling::Stratified) {

@@ -106,8 +106,10 @@ std::vector<Vec3> lights() {
   std::vector<Vec3> all;
   for (int e = 0; e < 4; ++e)
     for (int a = 0; a < 4; ++a) {
-      const float elevation = (static_cast<float>(e) + 0.5f) * kPi / 8, azimuth = (static_cast<float>(a) + 0.3f + 0.25f * static_cast<float>(e)) * kPi / 2;
-      all.emplace_back(std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation), std::sin(elevation));
+      const float elevation = (static_cast<float>(e) + 0.5f) * kPi / 8,
+                  azimuth = (static_cast<float>(a) + 0.3f + 0.25f * static_cast<float>(e)) * kPi / 2;
+      all.emplace_back(std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation),
+                       std::sin(elevation));
     }
   return all;
 }
@@ -156,15 +158,19 @@ std::vector<Image> levelsTo(const Image& map, int lastMip) {
 }
 
 std::string table(const std::vector<StudyRow>& rows, const std::vector<MipRow>& mips, const std::string& title) {
-  std::string text = "# Compression study: " + title + "\n\n| format | bits | mip | weight rmse | max | light rmse | max | normal mean deg | 99% |\n"
+  std::string text = "# Compression study: " + title +
+                     "\n\n| format | bits | mip | weight rmse | max | light rmse | max | normal mean deg | 99% |\n"
                      "|---|---|---|---|---|---|---|---|---|\n";
   std::array<char, 256> line{};
   for (const StudyRow& r : rows) {
-    std::snprintf(line.data(), line.size(), "| %s | %g | %d | %.5f | %.4f | %.5f | %.4f | %.3f | %.3f |\n", r.format.c_str(), r.bitsPerTexel,
-                  r.mip, r.weightRmse, r.weightMax, r.lightRmse, r.lightMax, r.normalMeanDegrees, r.normal99Degrees);
+    std::snprintf(line.data(), line.size(), "| %s | %g | %d | %.5f | %.4f | %.5f | %.4f | %.3f | %.3f |\n",
+                  r.format.c_str(), r.bitsPerTexel, r.mip, r.weightRmse, r.weightMax, r.lightRmse, r.lightMax,
+                  r.normalMeanDegrees, r.normal99Degrees);
     text += line.data();
   }
-  text += "\n| mip | light rmse against the mean of mip 0 | recovered normal against the mean normal, mean deg |\n|---|---|---|\n";
+  text +=
+      "\n| mip | light rmse against the mean of mip 0 | recovered normal against the mean normal, mean deg "
+      "|\n|---|---|---|\n";
   for (const MipRow& r : mips) {
     std::snprintf(line.data(), line.size(), "| %d | %.6f | %.3f |\n", r.mip, r.lightRmse, r.normalMeanDegrees);
     text += line.data();
@@ -181,7 +187,8 @@ Image studyPicture(const Image& map) {
   for (const Format& format : formats()) {
     const Image back = storedAndBack(crop, format);
     Image error(w, h, 3);
-    for (std::size_t i = 0; i < error.pixels.size(); ++i) error.pixels[i] = 8 * std::abs(back.pixels[i] - crop.pixels[i]);
+    for (std::size_t i = 0; i < error.pixels.size(); ++i)
+      error.pixels[i] = 8 * std::abs(back.pixels[i] - crop.pixels[i]);
     panels.push_back(mapTexels(back, [](const Vec3& s) { return s * 1.5f; }));
     panels.push_back(std::move(error));
     panels.push_back(mapTexels(back, [&](const Vec3& s) { return Vec3(litBy(s, right)); }));
@@ -192,7 +199,8 @@ Image studyPicture(const Image& map) {
 
 /// Small text files follow the same rule as images: complete or absent.
 Expected<void> writeText(const std::filesystem::path& file, const std::string& text) {
-  const auto temporary = file.parent_path() / ("." + file.filename().string() + "." + std::to_string(getpid()) + ".part");
+  const auto temporary =
+      file.parent_path() / ("." + file.filename().string() + "." + std::to_string(getpid()) + ".part");
   std::ofstream out(temporary, std::ios::binary);
   out << text;
   out.close();
@@ -252,8 +260,10 @@ Expected<void> writeStudy(const Image& map, const std::string& title, const std:
   std::error_code ec;
   std::filesystem::create_directories(folder, ec);
   if (ec) return failure(folder.string() + ": cannot be made: " + ec.message());
-  if (auto done = writeText(folder / "study.md", table(studyFormats(map, 3), studyMips(map, 6), title)); !done) return done;
-  return writeImage(folder / "study.png", studyPicture(map), {.format = PixelFormat::U8, .channelNames = {}, .metadata = {}});
+  if (auto done = writeText(folder / "study.md", table(studyFormats(map, 3), studyMips(map, 6), title)); !done)
+    return done;
+  return writeImage(folder / "study.png", studyPicture(map),
+                    {.format = PixelFormat::U8, .channelNames = {}, .metadata = {}});
 }
 
 }  // namespace lumel::ssbump

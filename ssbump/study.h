@@ -15,8 +15,8 @@ struct StudyRow {
   std::string format;
   int mip = 0;
   double bitsPerTexel = 0;
-  double weightRmse = 0, weightMax = 0;      // of the three squared weights
-  double lightRmse = 0, lightMax = 0;        // over 16 light directions, light 1 on a flat texel that faces it
+  double weightRmse = 0, weightMax = 0;               // of the three squared weights
+  double lightRmse = 0, lightMax = 0;                 // over 16 light directions, light 1 on a flat texel that faces it
   double normalMeanDegrees = 0, normal99Degrees = 0;  // recovered normals; 99: the 99th percentile
 };
 
@@ -26,8 +26,8 @@ struct StudyRow {
 /// `map`: squared weights, right-handed, three channels. Mips 0 to `lastMip` (box filter).
 std::vector<StudyRow> studyFormats(const Image& map, int lastMip);
 
-/// A mip level's recovered normals against the mean of the full map's, and its lighting against the mean lighting of the
-/// texels below it (equal for a box filter: lighting is linear in the weights).
+/// A mip level's recovered normals against the mean of the full map's, and its lighting against the mean lighting of
+/// the texels below it (equal for a box filter: lighting is linear in the weights).
 struct MipRow {
   int mip = 0;
   double lightRmse = 0;

@@ -69,7 +69,8 @@ void normalWeights(const Vec3& n, Convention convention, std::span<const Vec3> b
     sum += out[i];
   }
   if (convention == Convention::Linear) return;
-  const float scale = sum > 0 ? (convention == Convention::Mod2x ? 0.5f * static_cast<float>(basis.size()) : 1.0f) / sum : 0.0f;
+  const float scale =
+      sum > 0 ? (convention == Convention::Mod2x ? 0.5f * static_cast<float>(basis.size()) : 1.0f) / sum : 0.0f;
   for (float& w : out) w *= scale;
 }
 
@@ -111,9 +112,7 @@ Vec3 sampleRepeated(const Image& image, float u, float v) {
   };
   int x0, x1, y0, y1;
   const float fx = cell(u, image.width, x0, x1), fy = cell(v, image.height, y0, y1);
-  const auto fetch = [&](int x, int y) {
-    return image.channels >= 3 ? image.rgb(x, y) : Vec3(*image.at(x, y));
-  };
+  const auto fetch = [&](int x, int y) { return image.channels >= 3 ? image.rgb(x, y) : Vec3(*image.at(x, y)); };
   return glm::mix(glm::mix(fetch(x0, y0), fetch(x1, y0), fx), glm::mix(fetch(x0, y1), fetch(x1, y1), fx), fy);
 }
 
@@ -131,13 +130,15 @@ void blendDetail(Image& image, const Image& detail, const Encoding& encoding, fl
 
 Expected<Image> crossFade(const Image& a, const Image& b, const Encoding& encoding, float amount) {
   if (a.width != b.width || a.height != b.height)
-    return inputError("cross-fade: the maps differ in size (" + std::to_string(a.width) + "x" + std::to_string(a.height) +
-                      " and " + std::to_string(b.width) + "x" + std::to_string(b.height) + "); resize one of them");
+    return inputError("cross-fade: the maps differ in size (" + std::to_string(a.width) + "x" +
+                      std::to_string(a.height) + " and " + std::to_string(b.width) + "x" + std::to_string(b.height) +
+                      "); resize one of them");
   Image out = a;
   const Encoding squared{Convention::Squared, encoding.hand};
   forEachRow(out, [&](int y) {
     for (int x = 0; x < out.width; ++x) {
-      const Vec3 mixed = glm::mix(convert(a.rgb(x, y), encoding, squared), convert(b.rgb(x, y), encoding, squared), amount);
+      const Vec3 mixed =
+          glm::mix(convert(a.rgb(x, y), encoding, squared), convert(b.rgb(x, y), encoding, squared), amount);
       out.setRgb(x, y, convert(mixed, squared, encoding));
     }
   });
@@ -170,7 +171,8 @@ std::map<std::string, std::string> encodingMetadata(const Encoding& encoding) {
   const std::string convention = nameOf(encoding.convention), hand = nameOf(encoding.hand);
   return {{"lumel:ssbump", convention},
           {"lumel:ssbump:hand", hand},
-          {"lumel:ssbump:basis", "rnm B0=(sqrt(2/3),0,1/sqrt3) B1=(-1/sqrt6,1/sqrt2,1/sqrt3) B2=(-1/sqrt6,-1/sqrt2,1/sqrt3)"},
+          {"lumel:ssbump:basis",
+           "rnm B0=(sqrt(2/3),0,1/sqrt3) B1=(-1/sqrt6,1/sqrt2,1/sqrt3) B2=(-1/sqrt6,-1/sqrt2,1/sqrt3)"},
           {"ImageDescription", "lumel ssbump convention=" + convention + " hand=" + hand}};
 }
 

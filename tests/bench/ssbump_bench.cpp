@@ -23,7 +23,9 @@ const HeightField& field(int kind, int amplitude, int side = kSide) {
   auto& f = made[{kind, amplitude, side}];
   const auto a = static_cast<float>(amplitude);
   if (f.texels.empty())
-    f = kind == Fractal ? fields::fractal(side, side, a) : kind == Brick ? fields::bricks(side, side, a) : fields::steps(side, side, a);
+    f = kind == Fractal ? fields::fractal(side, side, a)
+        : kind == Brick ? fields::bricks(side, side, a)
+                        : fields::steps(side, side, a);
   return f;
 }
 
@@ -34,7 +36,8 @@ Texels probes(int side, int every) {
   for (int y = 0; y < side; y += every)
     for (int x = 0; x < side; x += every) {
       const auto jitter = [&](std::uint32_t k) {
-        return static_cast<int>(fields::hashUnit(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), k) * static_cast<float>(every));
+        return static_cast<int>(fields::hashUnit(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), k) *
+                                static_cast<float>(every));
       };
       texels.emplace_back(x + jitter(1), y + jitter(2));
     }
@@ -45,14 +48,17 @@ const std::vector<float>& truth(int kind, int amplitude) {
   static std::map<std::pair<int, int>, std::vector<float>> known;
   auto& t = known[{kind, amplitude}];
   if (!t.empty()) return t;
-  auto rays = RayOcclusion::build(field(kind, amplitude), {.count = kTruthRays, .sampling = RaySampling::Stratified, .seed = 99, .reach = 4 * kSide});
+  auto rays =
+      RayOcclusion::build(field(kind, amplitude),
+                          {.count = kTruthRays, .sampling = RaySampling::Stratified, .seed = 99, .reach = 4 * kSide});
   t = rays->occlusionAt(probes(kSide, 16), rnmLobes());
   return t;
 }
 
 double rmse(const std::vector<float>& values, const std::vector<float>& reference) {
   double sum = 0;
-  for (std::size_t i = 0; i < values.size(); ++i) sum += std::pow(static_cast<double>(values[i]) - static_cast<double>(reference[i]), 2);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    sum += std::pow(static_cast<double>(values[i]) - static_cast<double>(reference[i]), 2);
   return std::sqrt(sum / static_cast<double>(values.size()));
 }
 
@@ -61,7 +67,10 @@ double mean(const std::vector<float>& values) {
 }
 
 void describe(benchmark::State& state, int kind, int amplitude) {
-  state.SetLabel(std::string(kind == Fractal ? "fractal" : kind == Brick ? "brick" : "step") + " amplitude " + std::to_string(amplitude));
+  state.SetLabel(std::string(kind == Fractal ? "fractal"
+                             : kind == Brick ? "brick"
+                                             : "step") +
+                 " amplitude " + std::to_string(amplitude));
 }
 
 /// 512x512, one thread: time of the whole map and its error. Arguments: field, amplitude, azimuths.
@@ -72,7 +81,8 @@ void horizons(benchmark::State& state) {
   const ThreadLimit one(1);
   const auto lobes = rnmLobes();
   Image o;
-  for (auto _ : state) o = Horizon(f, {.azimuths = static_cast<int>(state.range(2))}).occlusion({0, 0, kSide, kSide}, lobes);
+  for (auto _ : state)
+    o = Horizon(f, {.azimuths = static_cast<int>(state.range(2))}).occlusion({0, 0, kSide, kSide}, lobes);
   std::vector<float> at;
   for (const auto& [x, y] : probes(kSide, 16)) at.insert(at.end(), o.at(x, y), o.at(x, y) + 3);
   state.counters["rmse"] = rmse(at, reference);
@@ -87,7 +97,8 @@ void rays300(benchmark::State& state) {
   const std::vector<float>& reference = truth(kind, amplitude);
   const ThreadLimit one(1);
   const auto lobes = rnmLobes();
-  auto rays = RayOcclusion::build(field(kind, amplitude), {.count = 300, .sampling = static_cast<RaySampling>(state.range(2)), .seed = 5});
+  auto rays = RayOcclusion::build(field(kind, amplitude),
+                                  {.count = 300, .sampling = static_cast<RaySampling>(state.range(2)), .seed = 5});
   Texels rows;
   for (int y = 7; y < kSide; y += 16)
     for (int x = 0; x < kSide; ++x) rows.emplace_back(x, y);
@@ -95,7 +106,8 @@ void rays300(benchmark::State& state) {
     auto o = rays->occlusionAt(rows, lobes);
     benchmark::DoNotOptimize(o.data());
   }
-  state.counters["rays/s"] = benchmark::Counter(static_cast<double>(rows.size()) * 300, benchmark::Counter::kIsIterationInvariantRate);
+  state.counters["rays/s"] =
+      benchmark::Counter(static_cast<double>(rows.size()) * 300, benchmark::Counter::kIsIterationInvariantRate);
   state.counters["texel_share"] = 1.0 / 16;
   state.counters["rmse"] = rmse(rays->occlusionAt(probes(kSide, 16), lobes), reference);
   describe(state, kind, amplitude);
@@ -117,7 +129,9 @@ void speedup(benchmark::State& state) {
   double horizonSeconds = 0, raySeconds = 0;
   Image o;
   using Clock = std::chrono::steady_clock;
-  const auto seconds = [](Clock::time_point a, Clock::time_point b) { return std::chrono::duration<double>(b - a).count(); };
+  const auto seconds = [](Clock::time_point a, Clock::time_point b) {
+    return std::chrono::duration<double>(b - a).count();
+  };
   for (auto _ : state) {
     const auto t0 = Clock::now();
     o = Horizon(f, {}).occlusion({0, 0, kSide, kSide}, lobes);
@@ -132,7 +146,8 @@ void speedup(benchmark::State& state) {
   std::sort(ratios.begin(), ratios.end());
   std::vector<float> at;
   for (const auto& [x, y] : probes(kSide, 16)) at.insert(at.end(), o.at(x, y), o.at(x, y) + 3);
-  const double rayRmse = rmse(rays->occlusionAt(probes(kSide, 16), lobes), reference), horizonRmse = rmse(at, reference);
+  const double rayRmse = rmse(rays->occlusionAt(probes(kSide, 16), lobes), reference),
+               horizonRmse = rmse(at, reference);
   state.counters["times_faster"] = ratios[ratios.size() / 2];
   state.counters["times_faster_min"] = ratios.front();
   state.counters["times_faster_max"] = ratios.back();
@@ -156,7 +171,8 @@ void scaling(benchmark::State& state) {
         benchmark::DoNotOptimize(o.pixels.data());
       }
   }
-  state.counters["texels/s"] = benchmark::Counter(static_cast<double>(side) * side, benchmark::Counter::kIsIterationInvariantRate);
+  state.counters["texels/s"] =
+      benchmark::Counter(static_cast<double>(side) * side, benchmark::Counter::kIsIterationInvariantRate);
 }
 
 void smoke(benchmark::State& state) {
@@ -172,10 +188,20 @@ void smoke(benchmark::State& state) {
 }
 
 BENCHMARK(smoke)->Iterations(1)->Unit(benchmark::kMillisecond);
-BENCHMARK(speedup)->ArgsProduct({{Fractal}, {8, 24, 64}})->Args({Brick, 24})->Args({Step, 24})->Iterations(5)->Unit(benchmark::kMillisecond);
-BENCHMARK(horizons)->ArgsProduct({{Fractal, Brick, Step}, {8, 24, 64}, {8, 16, 32, 48, 64}})->Iterations(3)->Unit(benchmark::kMillisecond);
+BENCHMARK(speedup)
+    ->ArgsProduct({{Fractal}, {8, 24, 64}})
+    ->Args({Brick, 24})
+    ->Args({Step, 24})
+    ->Iterations(5)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(horizons)
+    ->ArgsProduct({{Fractal, Brick, Step}, {8, 24, 64}, {8, 16, 32, 48, 64}})
+    ->Iterations(3)
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK(rays300)
-    ->ArgsProduct({{Fractal, Brick, Step}, {8, 24, 64}, {static_cast<int>(RaySampling::Random), static_cast<int>(RaySampling::Stratified)}})
+    ->ArgsProduct({{Fractal, Brick, Step},
+                   {8, 24, 64},
+                   {static_cast<int>(RaySampling::Random), static_cast<int>(RaySampling::Stratified)}})
     ->Iterations(1)
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(scaling)

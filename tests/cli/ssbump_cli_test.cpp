@@ -24,7 +24,8 @@ struct Ran {
 class SsbumpCli : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / (std::string("lumel-cli-ssbump-") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    folder_ = fs::path(testing::TempDir()) /
+              (std::string("lumel-cli-ssbump-") + testing::UnitTest::GetInstance()->current_test_info()->name());
     fs::remove_all(folder_);
     fs::create_directories(folder_);
     const HeightField field = fields::fractal(64, 64, 1, 4);
@@ -57,10 +58,14 @@ class SsbumpCli : public testing::Test {
 };
 
 TEST_F(SsbumpCli, WritesEveryMapThatIsAskedFor) {
-  const Ran ran = lumel("h.png -o s.png --height-scale 10 --save-weights w.tif --save-occlusion o.tga --save-ao ao.png --save-normal n.png "
-                        "--save-recovered r.exr --contact-sheet sheet.png --study study");
+  const Ran ran = lumel(
+      "h.png -o s.png --height-scale 10 --save-weights w.tif --save-occlusion o.tga --save-ao ao.png --save-normal "
+      "n.png "
+      "--save-recovered r.exr --contact-sheet sheet.png --study study");
   ASSERT_EQ(ran.code, 0) << ran.output;
-  for (const char* name : {"s.png", "w.tif", "o.tga", "ao.png", "n.png", "r.exr", "sheet.png", "study/study.md", "study/study.png"}) EXPECT_TRUE(exists(name)) << name;
+  for (const char* name :
+       {"s.png", "w.tif", "o.tga", "ao.png", "n.png", "r.exr", "sheet.png", "study/study.md", "study/study.png"})
+    EXPECT_TRUE(exists(name)) << name;
   EXPECT_NE(ran.output.find("64x64"), std::string::npos);
 }
 
@@ -69,7 +74,8 @@ TEST_F(SsbumpCli, BothMethodsAndAllFormatsAgree) {
   ASSERT_EQ(lumel("h.png -o b.exr --height-scale 8 --bits float -q --method rays --rays 1024 --threads 1").code, 0);
   const Image a = read("a.exr"), b = read("b.exr");
   double squares = 0;
-  for (std::size_t i = 0; i < a.pixels.size(); ++i) squares += std::pow(static_cast<double>(a.pixels[i] - b.pixels[i]), 2);
+  for (std::size_t i = 0; i < a.pixels.size(); ++i)
+    squares += std::pow(static_cast<double>(a.pixels[i] - b.pixels[i]), 2);
   // A weight of about a third times the 0.005 by which 1024 rays err.
   EXPECT_LT(std::sqrt(squares / static_cast<double>(a.pixels.size())), 0.004);
   ASSERT_EQ(lumel("h.png -o c.png --height-scale 8 --bits 16 -q").code, 0);
@@ -90,9 +96,11 @@ TEST_F(SsbumpCli, ConvertsThereAndBack) {
 }
 
 TEST_F(SsbumpCli, TheCommandLineIsChecked) {
-  for (const char* wrong : {"", "h.png", "h.png -o s.png --method guess", "h.png -o s.png --rays 0", "h.png -o s.png --azimuths 0",
-                            "h.png -o s.png --height-scale tall", "h.png -o s.png --convention cubed", "h.png -o s.jpeg2 ", "h.png -o s.png --bits half",
-                            "h.png -o s.png --cone-angle 400", "h.png -o s.png --unknown", "h.png -o s.png --low x.obj"}) {
+  for (const char* wrong :
+       {"", "h.png", "h.png -o s.png --method guess", "h.png -o s.png --rays 0", "h.png -o s.png --azimuths 0",
+        "h.png -o s.png --height-scale tall", "h.png -o s.png --convention cubed", "h.png -o s.jpeg2 ",
+        "h.png -o s.png --bits half", "h.png -o s.png --cone-angle 400", "h.png -o s.png --unknown",
+        "h.png -o s.png --low x.obj"}) {
     const Ran ran = lumel(wrong);
     EXPECT_EQ(ran.code, 2) << wrong << "\n" << ran.output;
     EXPECT_NE(ran.output.find("lumel"), std::string::npos) << wrong;
@@ -111,8 +119,9 @@ TEST_F(SsbumpCli, BadInputIsNamedAndLeavesNothing) {
   ASSERT_EQ(lumel("h.png -o unused.png --save-normal n.png --height-scale 8 -q").code, 0);
   fs::remove(folder_ / "unused.png");
   const std::size_t before = files();
-  for (const char* wrong : {"absent.png", "empty.png", "text.png", "inf.exr", "h.png --channel Z", "h.png --height-scale 1e9", "n.png",
-                            "h.png --normal-map h.png", "h.png --mask one.png", "h.png --basis text.png", "h.png --albedo absent.png"}) {
+  for (const char* wrong :
+       {"absent.png", "empty.png", "text.png", "inf.exr", "h.png --channel Z", "h.png --height-scale 1e9", "n.png",
+        "h.png --normal-map h.png", "h.png --mask one.png", "h.png --basis text.png", "h.png --albedo absent.png"}) {
     const Ran ran = lumel(std::string(wrong) + " -o s.png -q");
     EXPECT_EQ(ran.code, 3) << wrong << "\n" << ran.output;
     EXPECT_EQ(std::count(ran.output.begin(), ran.output.end(), '\n'), 1) << wrong << "\n" << ran.output;

@@ -283,6 +283,30 @@ TEST(Charts, BreakAtMirroredMaterialFramesOnly) {
       EXPECT_EQ(s.tangents[i], s.sourceVertex[i] < 4 ? Vec4(1, 0, 0, 1) : Vec4(-1, 0, 0, -1));
 }
 
+TEST(Charts, DoNotCloseAroundABreakOfTheFrame) {
+  // A flat ring of eight quads whose tangents turn with it: one break, where the turn ends, closes without a gap.
+  Scene scene;
+  scene.materials.emplace_back();
+  Primitive p;
+  constexpr int kSteps = 64;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double a = kTau * i / kSteps;
+    for (const double r : {1.0, 2.0}) {
+      p.positions.push_back(i == kSteps ? p.positions[r > 1.5 ? 1 : 0] : Vec3(r * std::cos(a), r * std::sin(a), 0));
+      p.normals.push_back(Vec3(0, 0, 1));
+      p.tangents.push_back(Vec4(std::cos(a / 4), std::sin(a / 4), 0, 1));
+    }
+  }
+  for (std::uint32_t i = 0; i < kSteps; ++i)
+    for (const std::uint32_t k : {2 * i, 2 * i + 1, 2 * i + 3, 2 * i, 2 * i + 3, 2 * i + 2}) p.indices.push_back(k);
+  scene.meshes.push_back({"ring", {p}});
+  scene.instances.emplace_back();
+  scene.instances[0].name = "ring";
+  const AtlasResult result = chartsOf(scene, 40);
+  EXPECT_EQ(result.atlas.charts.size(), 2u);
+  EXPECT_EQ(measureAtlas(result.atlas).overlapTexels, 0.0);
+}
+
 TEST(BakeFrame, OfALightmapPointsAlongItsUvs) {
   const AtlasResult result = chartsOf(torus(48, 24).scene(), 20);
   const Atlas& atlas = result.atlas;

@@ -77,6 +77,42 @@ TEST(ImageIo, PngInMemoryRoundTrips) {
   for (std::size_t i = 0; i < image.pixels.size(); ++i) EXPECT_NEAR(back->image.pixels[i], image.pixels[i], 1e-6);
 }
 
+TEST(ImageIo, PartsMakeTheSameFileAndAnUnfinishedOneLeavesNothing) {
+  Image image(5, 7, 3);
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = static_cast<float>(i) / 128;
+  const fs::path whole = scratch("whole.png"), parts = scratch("parts.png");
+  ASSERT_TRUE(writeImage(whole, image, {.format = PixelFormat::U16, .channelNames = {}, .metadata = {}}));
+  const auto rows = [&](int first, int count) {
+    Image part(5, count, 3);
+    std::copy_n(image.at(0, first), part.pixels.size(), part.pixels.begin());
+    return part;
+  };
+  {
+    auto writer = ImageWriter::open(parts, 5, 7, 3, {.format = PixelFormat::U16, .channelNames = {}, .metadata = {}});
+    ASSERT_TRUE(writer);
+    ASSERT_TRUE(writer->write(rows(0, 3)));
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(parts.parent_path()), {}), 1) << "only the whole file";
+  auto writer = ImageWriter::open(parts, 5, 7, 3, {.format = PixelFormat::U16, .channelNames = {}, .metadata = {}});
+  ASSERT_TRUE(writer);
+  ASSERT_TRUE(writer->write(rows(0, 3)));
+  ASSERT_TRUE(writer->write(rows(3, 4)));
+  EXPECT_FALSE(fs::exists(parts));
+  ASSERT_TRUE(writer->commit());
+  EXPECT_EQ(readImage(parts)->image.pixels, readImage(whole)->image.pixels);
+}
+
+TEST(ImageIo, IndexedColoursAreNamed) {
+  // A 1x1 TGA of image type 1: one table entry (blue 30, green 20, red 10) and the index 0.
+  const std::vector<std::uint8_t> tga{0, 1, 1, 0, 0, 1, 0, 24, 0, 0, 0, 0, 1, 0, 1, 0, 8, 0, 30, 20, 10, 0};
+  auto indexed = readImage(tga, "indexed.tga");
+  ASSERT_TRUE(indexed) << indexed.error().message;
+  EXPECT_TRUE(indexed->paletted);
+  auto png = encodePng(Image(2, 2, 3, 0.5f));
+  ASSERT_TRUE(png);
+  EXPECT_FALSE(readImage(*png, "rgb.png")->paletted);
+}
+
 TEST(ImageIo, HalfOverflowAndNanFailLoudlyAndLeaveNoFile) {
   Image image(2, 1, 3, 1.0f);
   image.pixels[4] = 70000.0f;

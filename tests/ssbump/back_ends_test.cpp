@@ -19,14 +19,16 @@ Difference compare(const HeightField& field, std::span<const Lobe> lobes, int ra
   for (int y = 1; y < field.height; y += step)
     for (int x = y % step; x < field.width; x += step) texels.emplace_back(x, y);
   const int reach = 2 * std::max(field.width, field.height);
-  auto rayField = RayOcclusion::build(field, {.count = rays, .sampling = RaySampling::Stratified, .seed = 3, .reach = reach});
+  auto rayField =
+      RayOcclusion::build(field, {.count = rays, .sampling = RaySampling::Stratified, .seed = 3, .reach = reach});
   EXPECT_TRUE(rayField);
   const std::vector<float> truth = rayField->occlusionAt(texels, lobes);
   const Image o = Horizon(field, {.azimuths = 64, .reach = reach}).occlusion({0, 0, field.width, field.height}, lobes);
   Difference d;
   for (std::size_t i = 0; i < texels.size(); ++i)
     for (std::size_t c = 0; c < lobes.size(); ++c) {
-      const double e = static_cast<double>(o.at(texels[i].first, texels[i].second)[c]) - static_cast<double>(truth[i * lobes.size() + c]);
+      const double e = static_cast<double>(o.at(texels[i].first, texels[i].second)[c]) -
+                       static_cast<double>(truth[i * lobes.size() + c]);
       d.rmse += e * e;
       d.bias += e;
     }

@@ -8,13 +8,14 @@
 
 namespace lumel::ssbump::closed_forms {
 
-/// Integral of w over an intersection of half spaces on the sphere, by Lambert's formula: half the sum over the edges of
-/// arc length times inward normal.
+/// Integral of w over an intersection of half spaces on the sphere, by Lambert's formula: half the sum over the edges
+/// of arc length times inward normal.
 inline Vec3d integrateDirections(const std::vector<Vec3d>& normals) {
   Vec3d sum(0);
   for (std::size_t k = 0; k < normals.size(); ++k) {
     const Vec3d n = normals[k];
-    const Vec3d u = glm::normalize(glm::cross(n, std::abs(n.z) < 0.9 ? Vec3d(0, 0, 1) : Vec3d(1, 0, 0))), v = glm::cross(n, u);
+    const Vec3d u = glm::normalize(glm::cross(n, std::abs(n.z) < 0.9 ? Vec3d(0, 0, 1) : Vec3d(1, 0, 0))),
+                v = glm::cross(n, u);
     // Each other half space keeps half of this great circle: an arc about the angle where it is deepest inside.
     double centre = 0, half = std::numbers::pi;
     for (std::size_t j = 0; j < normals.size() && half > 0; ++j) {
@@ -26,7 +27,8 @@ inline Vec3d integrateDirections(const std::vector<Vec3d>& normals) {
         half = std::numbers::pi / 2;
         continue;
       }
-      const double lo = std::max(-half, offset - std::numbers::pi / 2), hi = std::min(half, offset + std::numbers::pi / 2);
+      const double lo = std::max(-half, offset - std::numbers::pi / 2),
+                   hi = std::min(half, offset + std::numbers::pi / 2);
       half = std::max(0.0, (hi - lo) / 2);
       centre += (hi + lo) / 2;
     }
@@ -49,6 +51,7 @@ inline Vec3d wallPlane(double phi, double slope) {
   return {-std::sin(e) * std::cos(phi), -std::sin(e) * std::sin(phi), std::cos(e)};
 }
 
-inline constexpr double kEast = 0, kNorth = std::numbers::pi / 2, kWest = std::numbers::pi, kSouth = -std::numbers::pi / 2;
+inline constexpr double kEast = 0, kNorth = std::numbers::pi / 2, kWest = std::numbers::pi,
+                        kSouth = -std::numbers::pi / 2;
 
 }  // namespace lumel::ssbump::closed_forms

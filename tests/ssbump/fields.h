@@ -39,7 +39,8 @@ inline HeightField fractal(int width, int height, float amplitude, std::uint32_t
       const auto smooth = [](float t) { return t * t * (3 - 2 * t); };
       const float a = smooth(u - static_cast<float>(i)), b = smooth(v - static_cast<float>(j));
       const auto at = [&](std::uint32_t x, std::uint32_t y) { return hashUnit(x % cells, y % cells, 217 + octave); };
-      sum += weight * ((at(i, j) * (1 - a) + at(i + 1, j) * a) * (1 - b) + (at(i, j + 1) * (1 - a) + at(i + 1, j + 1) * a) * b);
+      sum += weight *
+             ((at(i, j) * (1 - a) + at(i + 1, j) * a) * (1 - b) + (at(i, j + 1) * (1 - a) + at(i + 1, j + 1) * a) * b);
     }
     return sum;
   });
@@ -52,8 +53,10 @@ inline HeightField fractal(int width, int height, float amplitude, std::uint32_t
 inline HeightField bricks(int width, int height, float amplitude) {
   return make(width, height, true, [&](int x, int y) {
     const int row = y / 32, shifted = (x + (row & 1) * 32) % width;
-    const float dx = static_cast<float>(std::min(shifted % 64, 63 - shifted % 64)), dy = static_cast<float>(std::min(y % 32, 31 - y % 32));
-    const float own = 0.8f + 0.2f * hashUnit(static_cast<std::uint32_t>(shifted / 64), static_cast<std::uint32_t>(row), 3);
+    const float dx = static_cast<float>(std::min(shifted % 64, 63 - shifted % 64)),
+                dy = static_cast<float>(std::min(y % 32, 31 - y % 32));
+    const float own =
+        0.8f + 0.2f * hashUnit(static_cast<std::uint32_t>(shifted / 64), static_cast<std::uint32_t>(row), 3);
     return amplitude * own * std::clamp((std::min(dx, dy) - 1) / 3, 0.0f, 1.0f);
   });
 }

@@ -31,7 +31,8 @@ TEST(HeightField, ScaleIsInTexelsOrPercentOfTheWidth) {
   EXPECT_EQ(heightFieldFromImage(loaded(8, 4, {"Y"}), options, "h")->texels[0], 1.0f);
   options.invert = true;
   EXPECT_EQ(heightFieldFromImage(loaded(8, 4, {"Y"}), options, "h")->texels[0], 3.0f);
-  for (const char* bad : {"", "%", "ten", "5 %", "nan", "1e999"}) EXPECT_EQ(parseHeightScale(bad, options).error().kind, ErrorKind::Usage) << bad;
+  for (const char* bad : {"", "%", "ten", "5 %", "nan", "1e999"})
+    EXPECT_EQ(parseHeightScale(bad, options).error().kind, ErrorKind::Usage) << bad;
 }
 
 TEST(HeightField, ChannelsByNameIndexAndLuminance) {
@@ -48,7 +49,8 @@ TEST(HeightField, ChannelsByNameIndexAndLuminance) {
   EXPECT_FLOAT_EQ(value("g"), 0.2f);
   EXPECT_FLOAT_EQ(value("2"), 0.3f);
   EXPECT_FLOAT_EQ(value("luminance"), luminance({0.1f, 0.2f, 0.3f}));
-  for (const char* bad : {"4", "-1", "Z", "Alph"}) EXPECT_EQ(findChannel(l, bad, "h").error().kind, ErrorKind::Input) << bad;
+  for (const char* bad : {"4", "-1", "Z", "Alph"})
+    EXPECT_EQ(findChannel(l, bad, "h").error().kind, ErrorKind::Input) << bad;
 }
 
 TEST(HeightField, BadInputIsNamed) {
@@ -65,6 +67,8 @@ TEST(HeightField, BadInputIsNamed) {
 
   LoadedImage palette = loaded(4, 4, {"R", "G", "B"});
   palette.paletted = true;
+  EXPECT_TRUE(heightFieldFromImage(LoadedImage(palette), texels, "h")) << "a table of greys is grey";
+  palette.image.pixels[4] = 0.9f;
   EXPECT_NE(heightFieldFromImage(std::move(palette), texels, "h").error().message.find("indexed"), std::string::npos);
 
   auto channel = heightFieldFromImage(loaded(4, 4, {"R", "G", "B"}), {.channel = "A", .scale = 1}, "h");
@@ -83,13 +87,17 @@ TEST(HeightField, ANormalMapIsRecognised) {
     for (int x = 0; x < 32; ++x)
       normals.image.setRgb(x, y, encodeNormal(heightNormal(fields::fractal(32, 32, 3), x, y), Green::Up));
   EXPECT_TRUE(looksLikeNormalMap(normals.image));
-  EXPECT_NE(heightFieldFromImage(LoadedImage(normals), {}, "n.png").error().message.find("normal map"), std::string::npos);
-  EXPECT_TRUE(heightFieldFromImage(LoadedImage(normals), {.channel = "B"}, "n.png")) << "a chosen channel is taken at its word";
+  EXPECT_NE(heightFieldFromImage(LoadedImage(normals), {}, "n.png").error().message.find("normal map"),
+            std::string::npos);
+  EXPECT_TRUE(heightFieldFromImage(LoadedImage(normals), {.channel = "B"}, "n.png"))
+      << "a chosen channel is taken at its word";
   // Grey heights and a noisy picture are none.
   LoadedImage grey = loaded(32, 32, {"R", "G", "B"});
-  for (std::size_t i = 0; i < grey.image.pixels.size(); ++i) grey.image.pixels[i] = fields::hashUnit(static_cast<std::uint32_t>(i / 3), 0, 0);
+  for (std::size_t i = 0; i < grey.image.pixels.size(); ++i)
+    grey.image.pixels[i] = fields::hashUnit(static_cast<std::uint32_t>(i / 3), 0, 0);
   EXPECT_FALSE(looksLikeNormalMap(grey.image));
-  for (std::size_t i = 0; i < grey.image.pixels.size(); ++i) grey.image.pixels[i] = fields::hashUnit(static_cast<std::uint32_t>(i), 0, 0);
+  for (std::size_t i = 0; i < grey.image.pixels.size(); ++i)
+    grey.image.pixels[i] = fields::hashUnit(static_cast<std::uint32_t>(i), 0, 0);
   EXPECT_FALSE(looksLikeNormalMap(grey.image));
 }
 
@@ -97,13 +105,15 @@ TEST(HeightField, NormalsLeanAwayFromTheSlope) {
   const HeightField east = fields::make(8, 8, false, [](int x, int) { return static_cast<float>(x); });
   EXPECT_NEAR(heightNormal(east, 4, 4).x, -std::sqrt(0.5), 1e-6);
   EXPECT_NEAR(heightNormal(east, 0, 4).x, -std::sqrt(0.5), 1e-6) << "one-sided at the edge";
-  const HeightField up = fields::make(8, 8, false, [](int, int y) { return static_cast<float>(-y); });  // rises up the image
+  const HeightField up =
+      fields::make(8, 8, false, [](int, int y) { return static_cast<float>(-y); });  // rises up the image
   EXPECT_NEAR(heightNormal(up, 4, 4).y, -std::sqrt(0.5), 1e-6);
 }
 
 TEST(Bilateral, SmoothsStairStepsAndKeepsEdges) {
   // A ramp in steps of 1 every 8 texels beside a cliff of 50.
-  HeightField field = fields::make(128, 16, false, [](int x, int) { return std::floor(static_cast<float>(x) / 8) + (x >= 64 ? 50.0f : 0.0f); });
+  HeightField field = fields::make(
+      128, 16, false, [](int x, int) { return std::floor(static_cast<float>(x) / 8) + (x >= 64 ? 50.0f : 0.0f); });
   const HeightField before = field;
   bilateralFilter(field, 6, 2.5f);
   float roughBefore = 0, roughAfter = 0;
@@ -138,7 +148,8 @@ TEST(BasisFile, ReadsUnitVectorsAndNamesBadLines) {
   const auto good = write("# four\n0 0 1\n\n0.6 0 0.8 # east\n-0.6 0 0.8\n0 0.8 0.6\n");
   ASSERT_TRUE(good);
   EXPECT_EQ(good->size(), 4u);
-  for (const char* bad : {"", "0 0\n", "0 0 1 1\n", "1 1 1\n", "0 0 -1\n", "a b c\n", "nan 0 1\n"}) EXPECT_FALSE(write(bad)) << bad;
+  for (const char* bad : {"", "0 0\n", "0 0 1 1\n", "1 1 1\n", "0 0 -1\n", "a b c\n", "nan 0 1\n"})
+    EXPECT_FALSE(write(bad)) << bad;
   EXPECT_NE(write("0 0 1\n0 0 2\n").error().message.find(":2:"), std::string::npos);
   EXPECT_FALSE(readBasis(folder / "absent.txt"));
 }

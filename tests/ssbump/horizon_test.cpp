@@ -55,11 +55,13 @@ TEST(Horizon, WallTowardsEachSide) {
                                    {kSouth, [](int, int y) { return y - 128; }}}};
   for (const Case& c : cases)
     for (const auto& [distance, height] : {std::pair{1, 0.5f}, {3, 3.0f}, {6, 12.0f}, {20, 20.0f}}) {
-      const HeightField wall = fields::make(257, 257, false, [&, d = distance, h = height](int x, int y) { return c.distance(x, y) >= d ? h : 0.0f; });
+      const HeightField wall = fields::make(
+          257, 257, false, [&, d = distance, h = height](int x, int y) { return c.distance(x, y) >= d ? h : 0.0f; });
       const auto o = at(wall, 128, 128);
       const double slope = static_cast<double>(height) / distance;
       for (std::size_t i = 0; i < 3; ++i)
-        EXPECT_NEAR(o[i], visibilityAbovePlanes(kRnmBasis[i], {wallPlane(c.phi, slope)}), distance <= 12 ? kClosedFormTolerance : kFarTolerance)
+        EXPECT_NEAR(o[i], visibilityAbovePlanes(kRnmBasis[i], {wallPlane(c.phi, slope)}),
+                    distance <= 12 ? kClosedFormTolerance : kFarTolerance)
             << "phi " << c.phi << " distance " << distance << " B" << i;
       EXPECT_NEAR(o[3], (1 + std::cos(std::atan(slope))) / 2, distance <= 12 ? kClosedFormTolerance : kFarTolerance);
     }
@@ -68,11 +70,14 @@ TEST(Horizon, WallTowardsEachSide) {
 TEST(Horizon, InfiniteGroove) {
   for (const auto& [left, right, height] : {std::tuple{4, 4, 6.0f}, {2, 7, 5.0f}, {11, 3, 12.0f}}) {
     // Tiles along the groove; across it the walls are plateaus as wide as the map.
-    const HeightField groove = fields::make(128, 64, true, [&, l = left, r = right, h = height](int x, int) { return x - 64 >= r || 64 - x >= l ? h : 0.0f; });
+    const HeightField groove = fields::make(128, 64, true, [&, l = left, r = right, h = height](int x, int) {
+      return x - 64 >= r || 64 - x >= l ? h : 0.0f;
+    });
     const auto o = at(groove, 64, 32);
     const double e = static_cast<double>(height) / right, w = static_cast<double>(height) / left;
     for (std::size_t i = 0; i < 3; ++i)
-      EXPECT_NEAR(o[i], visibilityAbovePlanes(kRnmBasis[i], {wallPlane(kEast, e), wallPlane(kWest, w)}), kClosedFormTolerance);
+      EXPECT_NEAR(o[i], visibilityAbovePlanes(kRnmBasis[i], {wallPlane(kEast, e), wallPlane(kWest, w)}),
+                  kClosedFormTolerance);
     EXPECT_NEAR(o[3], (std::cos(std::atan(e)) + std::cos(std::atan(w))) / 2, kClosedFormTolerance);
     // On the plateau, far from the edge, nothing rises.
     for (float v : at(groove, 0, 10)) EXPECT_NEAR(v, 1.0f, 1e-6f);
@@ -81,7 +86,8 @@ TEST(Horizon, InfiniteGroove) {
 
 TEST(Horizon, StaircaseSeesOnlyTheNextRiser) {
   constexpr int kTread = 9;
-  const HeightField stairs = fields::make(180, 301, false, [](int x, int) { return 5.0f * static_cast<float>(x / kTread); });
+  const HeightField stairs =
+      fields::make(180, 301, false, [](int x, int) { return 5.0f * static_cast<float>(x / kTread); });
   for (int d = 1; d <= kTread; ++d) {
     const auto o = at(stairs, 10 * kTread - d, 150);  // the next riser's top edge is d texels to the east
     const double slope = 5.0 / d;
@@ -118,19 +124,23 @@ TEST(Horizon, HemispherePitSeesHalf) {
   constexpr int kSteps = 1200;
   for (int i = 0; i < kSteps; ++i)
     for (int j = 0; j < kSteps; ++j) {
-      const double z = std::sqrt(0.5) + (i + 0.5) / kSteps * (1 - std::sqrt(0.5)), phi = 2 * std::numbers::pi * j / kSteps, s = std::sqrt(1 - z * z);
-      for (std::size_t k = 0; k < 3; ++k) cap[k] += std::max(0.0, glm::dot(Vec3d(kRnmBasis[k]), Vec3d(s * std::cos(phi), s * std::sin(phi), z)));
+      const double z = std::sqrt(0.5) + (i + 0.5) / kSteps * (1 - std::sqrt(0.5)),
+                   phi = 2 * std::numbers::pi * j / kSteps, s = std::sqrt(1 - z * z);
+      for (std::size_t k = 0; k < 3; ++k)
+        cap[k] += std::max(0.0, glm::dot(Vec3d(kRnmBasis[k]), Vec3d(s * std::cos(phi), s * std::sin(phi), z)));
     }
   const double solidAngle = 2 * std::numbers::pi * (1 - std::sqrt(0.5)) / (kSteps * double{kSteps});
   for (std::size_t k = 0; k < 3; ++k)
-    EXPECT_NEAR(o[k], cap[k] * solidAngle / (std::numbers::pi * (1 + static_cast<double>(kRnmBasis[k].z)) / 2), kStepTolerance);
+    EXPECT_NEAR(o[k], cap[k] * solidAngle / (std::numbers::pi * (1 + static_cast<double>(kRnmBasis[k].z)) / 2),
+                kStepTolerance);
   EXPECT_NEAR(o[3], 0.5, kStepTolerance);
 }
 
 TEST(Horizon, DirectionsAreThoseOfTheImage) {
   // Something tall to the right hides B0 most; above (smaller y) B1; below B2.
   const auto post = [](int px, int py) {
-    return fields::make(64, 64, false, [=](int x, int y) { return std::abs(x - px) <= 2 && std::abs(y - py) <= 2 ? 20.0f : 0.0f; });
+    return fields::make(64, 64, false,
+                        [=](int x, int y) { return std::abs(x - px) <= 2 && std::abs(y - py) <= 2 ? 20.0f : 0.0f; });
   };
   const auto right = at(post(38, 32), 32, 32), up = at(post(29, 27), 32, 32), down = at(post(29, 37), 32, 32);
   EXPECT_LT(right[0], right[1] - 0.05f);
@@ -154,7 +164,8 @@ TEST(Horizon, WrapsSeamlesslyAndWithoutWrapItEnds) {
   // Moving the map around its torus moves the result: sideways exactly, down by the rows' stride exactly.
   const HeightField a = fields::fractal(96, 64, 20);
   const HeightField b = fields::make(96, 64, true, [&](int x, int y) { return a.at(x + 41, y + 32); });
-  const Image oa = Horizon(a, {}).occlusion({0, 0, 96, 64}, allLobes()), ob = Horizon(b, {}).occlusion({0, 0, 96, 64}, allLobes());
+  const Image oa = Horizon(a, {}).occlusion({0, 0, 96, 64}, allLobes()),
+              ob = Horizon(b, {}).occlusion({0, 0, 96, 64}, allLobes());
   for (int y = 0; y < 64; ++y)
     for (int x = 0; x < 96; ++x)
       for (int c = 0; c < 4; ++c) ASSERT_EQ(ob.at(x, y)[c], oa.at((x + 41) % 96, (y + 32) % 64)[c]) << x << " " << y;
@@ -163,7 +174,9 @@ TEST(Horizon, WrapsSeamlesslyAndWithoutWrapItEnds) {
 TEST(Horizon, OddAndTinySizes) {
   for (const auto& [w, h] : {std::pair{1, 7}, {2, 2}, {3, 5}, {65, 1}, {127, 31}})
     for (bool wrap : {true, false}) {
-      HeightField field = fields::make(w, h, wrap, [](int x, int y) { return 3 * fields::hashUnit(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), 1); });
+      HeightField field = fields::make(w, h, wrap, [](int x, int y) {
+        return 3 * fields::hashUnit(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), 1);
+      });
       const Image o = Horizon(field, {}).occlusion({0, 0, w, h}, allLobes());
       for (float v : o.pixels) {
         ASSERT_GE(v, 0.0f);

@@ -14,7 +14,8 @@ double sliceByQuadrature(const Lobe& lobe, double phi, double t) {
   double sum = 0;
   for (int i = 0; i < kSteps; ++i) {
     const double e = lo + (i + 0.5) / kSteps * width;
-    const Vec3 w(static_cast<float>(std::cos(e) * std::cos(phi)), static_cast<float>(std::cos(e) * std::sin(phi)), static_cast<float>(std::sin(e)));
+    const Vec3 w(static_cast<float>(std::cos(e) * std::cos(phi)), static_cast<float>(std::cos(e) * std::sin(phi)),
+                 static_cast<float>(std::sin(e)));
     sum += static_cast<double>(lobeWeight(lobe, w)) * std::cos(e);
   }
   return sum * width / kSteps;
@@ -52,7 +53,8 @@ TEST(LobeSlice, AConeBeyondItsEdgeIsEmptyAndAHalfSphereConeIsTheHemisphere) {
   const Lobe away{glm::normalize(Vec3(1, 0, 0.2f)), LobeShape::Cone, 40};
   EXPECT_EQ(LobeSlice(away, std::numbers::pi).above(0), 0);
   const Lobe wide{kRnmBasis[1], LobeShape::Cone, 180}, hemisphere{kRnmBasis[1], LobeShape::Hemisphere, 0};
-  for (double t : {0.0, 0.5, 3.0}) EXPECT_NEAR(LobeSlice(wide, 2.2).above(t), LobeSlice(hemisphere, 2.2).above(t), 1e-6);
+  for (double t : {0.0, 0.5, 3.0})
+    EXPECT_NEAR(LobeSlice(wide, 2.2).above(t), LobeSlice(hemisphere, 2.2).above(t), 1e-6);
 }
 
 }  // namespace

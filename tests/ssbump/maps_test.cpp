@@ -20,7 +20,8 @@ namespace fs = std::filesystem;
 class Maps : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / (std::string("lumel-ssbump-") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    folder_ = fs::path(testing::TempDir()) /
+              (std::string("lumel-ssbump-") + testing::UnitTest::GetInstance()->current_test_info()->name());
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }
@@ -32,9 +33,11 @@ class Maps : public testing::Test {
     Image image(w, h, alpha ? 4 : 1);
     for (int y = 0; y < h; ++y)
       for (int x = 0; x < w; ++x)
-        for (int c = 0; c < image.channels; ++c) image.at(x, y)[c] = c == 3 ? static_cast<float>((x * 7 + y) % 256) / 255.0f : field.at(x, y);
+        for (int c = 0; c < image.channels; ++c)
+          image.at(x, y)[c] = c == 3 ? static_cast<float>((x * 7 + y) % 256) / 255.0f : field.at(x, y);
     const fs::path file = path(alpha ? "in_alpha.png" : "in.png");
-    EXPECT_TRUE(writeImage(file, image, {.format = alpha ? PixelFormat::U8 : PixelFormat::U16, .channelNames = {}, .metadata = {}}));
+    EXPECT_TRUE(writeImage(file, image,
+                           {.format = alpha ? PixelFormat::U8 : PixelFormat::U16, .channelNames = {}, .metadata = {}}));
     return file;
   }
   BakeSettings settings(const std::string& out) const {
@@ -44,7 +47,9 @@ class Maps : public testing::Test {
     s.maps.files.ssbump = path(out);
     return s;
   }
-  std::size_t filesInFolder() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), {})); }
+  std::size_t filesInFolder() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), {}));
+  }
 
   fs::path folder_;
   Progress silent_;
@@ -114,7 +119,8 @@ TEST_F(Maps, AlphaAndMaskPassThroughUntouched) {
   s.maps.mask = path("mask.png");
   ASSERT_TRUE(bakeHeightMap(heights(40, 24, true), s, silent_));
   out = read(path("s.png"));
-  for (std::size_t i = 0; i < mask.pixels.size(); ++i) ASSERT_EQ(std::lround(out.pixels[i * 4 + 3] * 255), static_cast<long>(i % 251));
+  for (std::size_t i = 0; i < mask.pixels.size(); ++i)
+    ASSERT_EQ(std::lround(out.pixels[i * 4 + 3] * 255), static_cast<long>(i % 251));
 }
 
 TEST_F(Maps, TilesAndThreadsGiveTheSameFile) {
@@ -186,8 +192,12 @@ TEST_F(Maps, DdsReadsBackThroughOpenImageIO) {
   const fs::path in = heights(64, 64);
   ASSERT_TRUE(bakeHeightMap(in, reference, silent_));
   const Image truth = read(path("s.exr"));
-  // 8 bits round to half of 1/255. A block's colours lie on one line: the root mean square stays near a tenth of a weight.
-  for (const auto& [format, tolerance] : {std::pair{DdsFormat::Rgba8, 0.3 / 255}, {DdsFormat::Rgba16, 1e-5}, {DdsFormat::Bc1, 0.06}, {DdsFormat::Bc3, 0.06}}) {
+  // 8 bits round to half of 1/255. A block's colours lie on one line: the root mean square stays near a tenth of a
+  // weight.
+  for (const auto& [format, tolerance] : {std::pair{DdsFormat::Rgba8, 0.3 / 255},
+                                          {DdsFormat::Rgba16, 1e-5},
+                                          {DdsFormat::Bc1, 0.06},
+                                          {DdsFormat::Bc3, 0.06}}) {
     dds.maps.options.ddsFormat = format;
     ASSERT_TRUE(bakeHeightMap(in, dds, silent_));
     if (format == DdsFormat::Rgba16) {

@@ -36,7 +36,9 @@ Scene quads(const std::vector<Vec3>& corners, const std::vector<Vec2>& uvs = {},
 }
 
 /// The plane y = 0 from -size to size.
-std::vector<Vec3> ground(float size) { return {{-size, 0, size}, {size, 0, size}, {size, 0, -size}, {-size, 0, -size}}; }
+std::vector<Vec3> ground(float size) {
+  return {{-size, 0, size}, {size, 0, size}, {size, 0, -size}, {-size, 0, -size}};
+}
 
 /// What the texel at the middle of a small flat tile about the origin sees.
 std::vector<float> atOrigin(const Scene& high, int rays = 16384) {
@@ -72,7 +74,8 @@ TEST(MeshSource, AWallInTheFlatTilesFrame) {
 }
 
 TEST(MeshSource, LightComesInUnderAnOverhang) {
-  // A sheet 1 above the ground, from 0.5 to 4 east of the texel: hides the elevations between atan(1/4) and atan(1/0.5).
+  // A sheet 1 above the ground, from 0.5 to 4 east of the texel: hides the elevations between atan(1/4) and
+  // atan(1/0.5).
   std::vector<Vec3> corners = ground(10);
   for (Vec3 p : {Vec3(0.5f, 1, 1000), Vec3(4, 1, 1000), Vec3(4, 1, -1000), Vec3(0.5f, 1, -1000)}) corners.push_back(p);
   const double hidden = (std::cos(std::atan(1 / 4.0)) - std::cos(std::atan(1 / 0.5))) / 2;
@@ -105,7 +108,8 @@ TEST(MeshSource, AgreesWithTheHeightFieldItIsMadeOf) {
   for (int y = 0; y < 32; ++y)
     for (int x = 0; x < 32; ++x)
       for (const auto& [dx, dy] : {std::pair{0, 1}, {1, 1}, {1, 0}, {0, 0}})
-        corners.push_back({static_cast<float>(x + dx) - 15.5f, field.at(x + dx, y + dy), static_cast<float>(y + dy) - 15.5f});
+        corners.push_back(
+            {static_cast<float>(x + dx) - 15.5f, field.at(x + dx, y + dy), static_cast<float>(y + dy) - 15.5f});
   MeshSettings s;
   s.width = s.height = 32;
   s.tileWidth = s.tileHeight = 32;  // about the origin: texel centres are the vertices
@@ -115,7 +119,8 @@ TEST(MeshSource, AgreesWithTheHeightFieldItIsMadeOf) {
   ASSERT_TRUE(mesh);
   const Image horizon = Horizon(field, {}).occlusion({0, 0, 32, 32}, lobes);
   double squares = 0;
-  for (std::size_t i = 0; i < horizon.pixels.size(); ++i) squares += std::pow(static_cast<double>(horizon.pixels[i] - mesh->occlusion.pixels[i]), 2);
+  for (std::size_t i = 0; i < horizon.pixels.size(); ++i)
+    squares += std::pow(static_cast<double>(horizon.pixels[i] - mesh->occlusion.pixels[i]), 2);
   // 0.004 of noise in 1024 rays, and cells split along the other diagonal.
   EXPECT_LT(std::sqrt(squares / static_cast<double>(horizon.pixels.size())), 0.012);
 }
@@ -126,7 +131,8 @@ const std::vector<Vec2> kUvs{{0, 1}, {1, 1}, {1, 0}, {0, 0}};  // u along x, v d
 /// A plate in the plane z = 0 with a fence standing on it at x = 0.625, and what the texel at x = 0.5625 sees of it.
 std::vector<float> atFence(const std::vector<Vec2>& uvs, int column, const Mat4& world) {
   std::vector<Vec3> fence{{-3, -3, 0}, {4, -3, 0}, {4, 4, 0}, {-3, 4, 0}};
-  for (Vec3 p : {Vec3(0.625f, -100, 0), Vec3(0.625f, -100, 0.125f), Vec3(0.625f, 100, 0.125f), Vec3(0.625f, 100, 0)}) fence.push_back(p);
+  for (Vec3 p : {Vec3(0.625f, -100, 0), Vec3(0.625f, -100, 0.125f), Vec3(0.625f, 100, 0.125f), Vec3(0.625f, 100, 0)})
+    fence.push_back(p);
   const Scene high = quads(fence, {}, world), low = quads(kLowCorners, uvs, world);
   MeshSettings s;
   s.width = s.height = 8;
@@ -158,7 +164,8 @@ TEST(MeshSource, HighPolyNormalsAreInTheLowPolysFrame) {
   // A high-poly plane that leans up towards +x by 20 degrees, over a level low-poly one.
   const float s = std::tan(20 * kPi / 180);
   std::vector<Vec3> leaning;
-  for (Vec3 p : {Vec3(-1, -1, 0), Vec3(2, -1, 0), Vec3(2, 2, 0), Vec3(-1, 2, 0)}) leaning.push_back({p.x, p.y, 0.1f * s * (p.x - 0.5f)});
+  for (Vec3 p : {Vec3(-1, -1, 0), Vec3(2, -1, 0), Vec3(2, 2, 0), Vec3(-1, 2, 0)})
+    leaning.push_back({p.x, p.y, 0.1f * s * (p.x - 0.5f)});
   const Scene low = quads(kLowCorners, kUvs);
   MeshSettings settings;
   settings.width = settings.height = 4;

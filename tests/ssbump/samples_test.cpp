@@ -33,7 +33,8 @@ TEST(HemisphereSamples, StrataHoldOneEachForTheLiteraturesThreeHundred) {
   for (int i = 0; i < 300; ++i) {
     const Vec3 w = samples.direction(123456789, i);
     const double azimuth = std::atan2(static_cast<double>(w.y), static_cast<double>(w.x)) / (2 * std::numbers::pi);
-    const int row = static_cast<int>((azimuth < 0 ? azimuth + 1 : azimuth) * 20), column = static_cast<int>(static_cast<double>(w.z) * 15);
+    const int row = static_cast<int>((azimuth < 0 ? azimuth + 1 : azimuth) * 20),
+              column = static_cast<int>(static_cast<double>(w.z) * 15);
     ++cells[static_cast<std::size_t>(std::min(row, 19) * 15 + std::min(column, 14))];
   }
   // Points within float rounding of a cell's edge may count for its neighbour.

@@ -91,10 +91,16 @@ TEST(Weights, DetailBlendKeepsEveryRecoveredNormal) {
   Image map(16, 16, 3), detail(8, 8, 3);
   for (int y = 0; y < 16; ++y)
     for (int x = 0; x < 16; ++x)
-      map.setRgb(x, y, normalWeights(kNormals[static_cast<std::size_t>((x + y * 16) % 40)]) *
-                           Vec3(fields::hashUnit(1, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)) * 0.5f + 0.5f, 0.7f, 0.9f));
+      map.setRgb(
+          x, y,
+          normalWeights(kNormals[static_cast<std::size_t>((x + y * 16) % 40)]) *
+              Vec3(fields::hashUnit(1, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)) * 0.5f + 0.5f,
+                   0.7f, 0.9f));
   for (int y = 0; y < 8; ++y)
-    for (int x = 0; x < 8; ++x) detail.setRgb(x, y, normalWeights(kNormals[static_cast<std::size_t>((x * 5 + y) % 40)]) * (0.3f + 0.08f * static_cast<float>(x)));
+    for (int x = 0; x < 8; ++x)
+      detail.setRgb(
+          x, y,
+          normalWeights(kNormals[static_cast<std::size_t>((x * 5 + y) % 40)]) * (0.3f + 0.08f * static_cast<float>(x)));
   Image blended = map;
   blendDetail(blended, detail, {}, 3);
   bool changed = false;
