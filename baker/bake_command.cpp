@@ -6,6 +6,7 @@
 #include "baker/bake.h"
 #include "baker/bake_files.h"
 #include "baker/command.h"
+#include "baker/conventions.h"
 #include "baker/finish.h"
 #include "baker/stage_clock.h"
 #include "lightmap/atlas.h"
@@ -161,6 +162,7 @@ void printSummary(const fs::path& output, const AtlasResult& atlas, const BakeRe
 
 BakeRecord recordOf(const BakeArguments& a, int dilate, nlohmann::ordered_json settings) {
   settings["dilate"] = dilate;
+  settings["bounces"] = describeBounces(a.bake.bounces);
   // What cannot change the result is kept out of the settings, so that equal bakes have equal settings.
   for (const char* key : {"output", "threads"}) settings.erase(key);
   BakeRecord record;
@@ -202,7 +204,7 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   auto baked = bake(*scene, atlas->atlas, texels, a.bake, progress);
   if (!baked) return baked.error();
   clock.start("finish");
-  dilatePages(baked->pages, dilate);
+  finishPages(baked->pages, atlas->atlas, texels, dilate);
   clock.stop();
   if (progress.cancelled()) return interrupted();
 

@@ -28,6 +28,8 @@ const char* nameOf(RnmDecode decode) {
   return "?";
 }
 
+std::string describeBounces(int bounces) { return bounces == kAllBounces ? "all" : std::to_string(bounces); }
+
 std::map<std::string, std::string> describeConventions(Projection projection) {
   std::string basis;
   for (std::size_t i = 0; i < kRnmBasis.size(); ++i) {

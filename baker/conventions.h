@@ -4,12 +4,15 @@
 #include <map>
 #include <string>
 
+#include "baker/bake.h"
 #include "lightmap/projection.h"
 
 namespace lumel {
 
 const char* nameOf(Projection projection);  // "raw", "flat", "fit"
 const char* nameOf(RnmDecode decode);       // "squared", "linear", "linear-normalized"
+
+std::string describeBounces(int bounces);      // a number, or "all"
 
 /// The decode that every bake is made for.
 inline constexpr RnmDecode kBakeDecode = RnmDecode::Squared;

@@ -1,23 +1,63 @@
 #include "baker/finish.h"
 
+#include <algorithm>
+
 #include "lightmap/dilate.h"
 #include "scene/parallel.h"
 
 namespace lumel {
+namespace {
 
-void dilatePages(std::vector<BakedPage>& pages, int rings) {
-  if (rings <= 0) return;
+constexpr float kLeastValidity = 0.5f;
+
+/// What is known of a page's texels, row by row.
+struct PageState {
+  TexelMask covered;
+  TexelMask valid;
+  std::vector<std::uint8_t> holes;      // covered, not valid
+  std::vector<std::uint32_t> chartIds;  // 0: none, else chart + 1; the first where several share a texel
+  bool hasHoles = false;
+};
+
+PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& texels) {
+  const std::size_t count = page.aux.pixels.size() / 4;
+  PageState state;
+  state.covered = state.valid = {page.aux.width, page.aux.height, std::vector<std::uint8_t>(count, 0)};
+  state.holes.assign(count, 0);
+  state.chartIds.assign(count, 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float* aux = page.aux.pixels.data() + i * 4;
+    if (!(aux[0] > 0.0f)) continue;
+    state.covered.known[i] = 1;
+    (aux[1] < kLeastValidity ? state.holes[i] : state.valid.known[i]) = 1;
+  }
+  state.hasHoles = std::find(state.holes.begin(), state.holes.end(), 1) != state.holes.end();
+  if (!state.hasHoles) return state;
+  for (std::size_t texel = 0; texel < texels.size(); ++texel) {
+    const TexelCoord at = texels.coords[texel];
+    const TriangleRef triangle = texels.trianglesOf(texel).front();
+    state.chartIds[static_cast<std::size_t>(at.y) * static_cast<std::size_t>(page.aux.width) + at.x] =
+        atlas.surfaces[triangle.surface].charts[triangle.triangle] + 1;
+  }
+  return state;
+}
+
+}  // namespace
+
+void finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels, int rings) {
   constexpr std::size_t kMaps = 4;
-  parallelFor(pages.size() * kMaps, 1, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      BakedPage& page = pages[i / kMaps];
-      TexelMask mask{page.aux.width, page.aux.height, {}};
-      mask.known.reserve(page.aux.pixels.size() / 4);
-      for (std::size_t texel = 0; texel < page.aux.pixels.size(); texel += 4)
-        mask.known.push_back(page.aux.pixels[texel] > 0.0f ? 1 : 0);
-      dilate(i % kMaps < 3 ? page.rnm[i % kMaps] : page.flat, mask, rings);
-    }
-  });
+  for (std::size_t p = 0; p < pages.size(); ++p) {
+    BakedPage& page = pages[p];
+    const PageState state = stateOf(page, atlas, texels[p]);
+    parallelFor(kMaps, 1, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) {
+        Image& map = i < 3 ? page.rnm[i] : page.flat;
+        if (state.hasHoles) fillHoles(map, state.valid, state.chartIds, state.holes);
+        TexelMask known = state.covered;
+        if (rings > 0) dilate(map, known, rings);
+      }
+    });
+  }
 }
 
 }  // namespace lumel

@@ -112,7 +112,8 @@ TEST(Config, CommandLineWinsOverConfigOverDefaults) {
   EXPECT_EQ(settings["samples"], 5);
   EXPECT_EQ(settings["seed"], 7);
   EXPECT_EQ(settings["sky-color"], nlohmann::json({1.0, 0.5, 0.0}));
-  EXPECT_EQ(settings["bounces"], 4);
+  EXPECT_EQ(settings["bounces"], "all");
+  EXPECT_EQ(settings["projection"], "flat");
 }
 
 TEST(Config, MistakesAre2WithFileAndLine) {
