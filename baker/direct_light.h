@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "baker/light_transport.h"
+#include "baker/sample_lanes.h"
 #include "baker/sampling.h"
-#include "baker/sobol.h"
 
 namespace lumel {
 
@@ -24,18 +24,17 @@ struct Receiver {
 /// The sample patterns that one receiver's decisions use, counted from a base.
 enum LightPattern : std::uint32_t { kPunctual, kEmitter, kEmitterPoint, kSky, kLightPatterns };
 
-/// One lane of a wave that wants light: `active` lanes are asked for.
+/// The lanes of a wave that want light: those that are `active`.
 struct LightLanes {
   std::array<bool, kLanes> active{};
   std::array<Receiver, kLanes> receivers;
-  std::array<TexelSampler, kLanes> samplers;
 };
 
 /// Samples the lights for every active lane and calls add(lane, wi, radianceOverPdf) for each that is visible.
 /// `surfacePdf(cosTheta)` is the density with which the receiver gathers from a direction, for multiple importance
 /// sampling against hits. Returns the number of shadow rays.
 template <class SurfacePdf, class Add>
-std::uint64_t directLight(const LightTransport& transport, const LightLanes& lanes, std::uint32_t sample,
+std::uint64_t directLight(const LightTransport& transport, const LightLanes& lanes, const SampleLanes& samples,
                           std::uint32_t patternBase, TraceMode mode, SurfacePdf surfacePdf, Add add) {
   std::uint64_t shadowRays = 0;
   const auto estimate = [&](auto takeSample) {
@@ -46,7 +45,7 @@ std::uint64_t directLight(const LightTransport& transport, const LightLanes& lan
       const auto l = static_cast<std::size_t>(lane);
       if (!lanes.active[l]) continue;
       const Receiver& receiver = lanes.receivers[l];
-      const LightSample s = takeSample(receiver, lanes.samplers[l]);
+      const LightSample s = takeSample(receiver, lane);
       if (s.weight == Vec3(0.0f) || !receiver.sees(s.wi)) continue;
       wi[l] = s.wi;
       light[l] = s.weight;
@@ -61,19 +60,19 @@ std::uint64_t directLight(const LightTransport& transport, const LightLanes& lan
     for (int lane = 0; lane < kLanes; ++lane)
       if (shadows.visible(lane)) add(lane, wi[static_cast<std::size_t>(lane)], light[static_cast<std::size_t>(lane)]);
   };
-  if (!transport.punctual.empty())
-    estimate([&](const Receiver& r, const TexelSampler& sampler) {
-      return transport.punctual.sample(r.p, r.ns, sampler.get1D(sample, patternBase + kPunctual));
-    });
-  if (!transport.emissive.empty())
-    estimate([&](const Receiver& r, const TexelSampler& sampler) {
-      return transport.emissive.sample(r.p, sampler.get1D(sample, patternBase + kEmitter),
-                                       sampler.get2D(sample, patternBase + kEmitterPoint));
-    });
-  if (transport.environment.sampled())
-    estimate([&](const Receiver&, const TexelSampler& sampler) {
-      return transport.environment.sample(sampler.get2D(sample, patternBase + kSky));
-    });
+  if (!transport.punctual.empty()) {
+    const UnitLanes choice = samples.draw1D(patternBase + kPunctual);
+    estimate([&](const Receiver& r, int lane) { return transport.punctual.sample(r.p, r.ns, choice.u[lane]); });
+  }
+  if (!transport.emissive.empty()) {
+    const UnitLanes choice = samples.draw1D(patternBase + kEmitter);
+    const UnitSquareLanes point = samples.draw2D(patternBase + kEmitterPoint);
+    estimate([&](const Receiver& r, int lane) { return transport.emissive.sample(r.p, choice.u[lane], point[lane]); });
+  }
+  if (transport.environment.sampled()) {
+    const UnitSquareLanes point = samples.draw2D(patternBase + kSky);
+    estimate([&](const Receiver&, int lane) { return transport.environment.sample(point[lane]); });
+  }
   return shadowRays;
 }
 

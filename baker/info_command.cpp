@@ -8,6 +8,7 @@
 #include "baker/command.h"
 #include "baker/image_figures.h"
 #include "baker/scene_figures.h"
+#include "baker/scene_lint.h"
 #include "scene/image_io.h"
 #include "scene/load_scene.h"
 
@@ -21,6 +22,8 @@ struct InfoArguments {
   fs::path file;
   bool json = false;
   EstimateOptions estimate;
+  bool lint = false;
+  SceneLintOptions lintOptions;
   bool allowOutsidePaths = false;
 };
 
@@ -106,6 +109,16 @@ Expected<Json> describe(const InfoArguments& a) {
   const auto scene = loadScene(a.file, {.allowOutsidePaths = a.allowOutsidePaths});
   if (!scene) return scene.error();
   Json out = {{"kind", "scene"}, {"file", a.file.string()}};
+  if (a.lint || !a.lintOptions.pictures.empty()) {
+    SceneLintOptions options = a.lintOptions;
+    options.atlas.texelsPerMeter = a.estimate.texelsPerMeter;
+    options.atlas.pageSize = a.estimate.pageSize;
+    const auto lint = lintScene(*scene, options);
+    if (!lint) return lint.error();
+    // Text shows the lines alone: they hold all the findings.
+    out["lint"] = a.json ? *lint : lint->at("lines");
+    return out;
+  }
   out.update(describeScene(*scene, a.estimate));
   return out;
 }
@@ -122,6 +135,8 @@ Command infoCommand() {
       "Examples:\n"
       "  lumel info level.gltf --texels-per-meter 16\n"
       "      meshes, materials, lights, warnings, and how many texels such a bake would have\n"
+      "  lumel info level.gltf --lint --charts out/charts\n"
+      "      what is wrong or wasteful in the lightmap UVs, and pictures of them\n"
       "  lumel info out/level\n"
       "      settings, conventions, pages and figures of a bake\n"
       "  lumel info out/level/lightmap-0-flat.exr --json";
@@ -132,6 +147,11 @@ Command infoCommand() {
   command.options.number("texels-per-meter", a.estimate.texelsPerMeter, {0.0f, 1e6f},
                          "Density for the estimate; 0: the density that fills one page");
   command.options.integer("page-size", a.estimate.pageSize, {4, 16384}, "Texels on a side of a page, for the estimate");
+  command.options.flag("lint", a.lint, "Check the lightmap UVs that a bake would use: overlaps, flips, tiny charts, ...");
+  command.options.choice("uv", a.lintOptions.atlas.uvSource, {"auto", "scene", "generate"},
+                         "Lightmap UVs to check: the scene's where valid, the scene's, or generated ones");
+  command.options.integer("padding", a.lintOptions.atlas.padding, {0, 64}, "Texels between charts");
+  command.options.path("charts", a.lintOptions.pictures, "Write a picture of each page's charts (PNG) to this folder").placeholder = "DIR";
   command.options.flag("allow-outside-paths", a.allowOutsidePaths, "Let the scene name files outside its own folder");
   command.run = [arguments](CommandContext& context) -> Expected<void> {
     const auto json = describe(*arguments);

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "baker/sampling.h"
+#include "scene/parallel.h"
 
 namespace lumel {
 namespace {
@@ -117,59 +118,81 @@ LightSample PunctualLights::sample(const Vec3& p, const Vec3& n, float u) const 
 
 EmissiveTriangles::EmissiveTriangles(RayScene& rays, const Materials& materials)
     : rays_(&rays), materials_(&materials) {
-  std::vector<float> powers;
   for (std::uint32_t p = 0; p < rays.parts().size(); ++p) {
     ScenePart& part = rays.parts()[p];
     if (!materials.emits(part.primitive->material)) continue;
     part.firstEmitter = static_cast<std::int64_t>(triangles_.size());
-    for (std::uint32_t t = 0; t < part.primitive->triangleCount(); ++t) {
-      Vec3 corner[3];
-      rays.corners(part, t, corner);
-      const float area = 0.5f * glm::length(glm::cross(corner[1] - corner[0], corner[2] - corner[0]));
-      triangles_.push_back({p, t, area});
-      powers.push_back(area * meanEmission(materials, *part.primitive, t));
-    }
+    for (std::uint32_t t = 0; t < part.primitive->triangleCount(); ++t)
+      triangles_.push_back({.part = p, .triangle = t});
   }
+  std::vector<float> powers(triangles_.size());
+  std::vector<float> areas(triangles_.size());
+  parallelFor(triangles_.size(), 256, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      areas[i] = describe(triangles_[i]);
+      const Primitive& primitive = *rays.parts()[triangles_[i].part].primitive;
+      const float sides = triangles_[i].doubleSided ? 2.0f : 1.0f;
+      powers[i] = sides * areas[i] * meanEmission(materials, primitive, triangles_[i].triangle);
+    }
+  });
   choice_ = Distribution(powers);
+  if (choice_.empty()) return;
+  for (std::size_t i = 0; i < triangles_.size(); ++i)
+    if (choice_.probability(i) > 0.0f) triangles_[i].densityByArea = choice_.probability(i) / areas[i];
+}
+
+float EmissiveTriangles::describe(Emitter& emitter) const {
+  const ScenePart& part = rays_->parts()[emitter.part];
+  const Material& material = materials_->material(part.primitive->material);
+  const std::array<Vec3, 3> corners = rays_->corners(part, emitter.triangle);
+  emitter.corner = corners[0];
+  emitter.e1 = corners[1] - corners[0];
+  emitter.e2 = corners[2] - corners[0];
+  const Vec3 cross = glm::cross(emitter.e1, emitter.e2);
+  emitter.ng = glm::normalize(cross) * part.frontSign;
+  emitter.offsetMeters = offsetDistance(corners, part.translation);
+  emitter.doubleSided = material.doubleSided;
+  emitter.uniform = !material.emissionMap && !materials_->needsAlphaTest(*part.primitive);
+  emitter.radiance = materials_->emission({part.primitive, emitter.triangle, Vec2(1.0f / 3)});
+  return 0.5f * glm::length(cross);
+}
+
+Vec3 EmissiveTriangles::radianceAt(const Emitter& emitter, Vec2 barycentric) const {
+  if (emitter.uniform) return emitter.radiance;
+  const TrianglePoint point{rays_->parts()[emitter.part].primitive, emitter.triangle, barycentric};
+  return materials_->emission(point) * materials_->opacity(point);
 }
 
 LightSample EmissiveTriangles::sample(const Vec3& p, float uTriangle, Vec2 uPoint) const {
   LightSample sample;
-  const std::size_t index = choice_.choose(uTriangle);
-  const Emitter& emitter = triangles_[index];
-  const ScenePart& part = rays_->parts()[emitter.part];
-  Vec3 corner[3];
-  rays_->corners(part, emitter.triangle, corner);
+  const Emitter& emitter = triangles_[choice_.choose(uTriangle)];
   const Vec2 b = sampleTriangle(uPoint);
-  const Vec3 e1 = corner[1] - corner[0];
-  const Vec3 e2 = corner[2] - corner[0];
-  const Vec3 q = corner[0] + b.x * e1 + b.y * e2;
+  const Vec3 q = emitter.corner + b.x * emitter.e1 + b.y * emitter.e2;
   const Vec3 toLight = q - p;
   const float distance2 = glm::dot(toLight, toLight);
-  Vec3 ng = glm::normalize(glm::cross(e1, e2)) * part.frontSign;
   if (!(distance2 > 0.0f)) return sample;
   sample.wi = toLight / std::sqrt(distance2);
-  float cosLight = -glm::dot(sample.wi, ng);
-  if (cosLight < 0.0f && materials_->material(part.primitive->material).doubleSided) {
+  float cosLight = -glm::dot(sample.wi, emitter.ng);
+  Vec3 ng = emitter.ng;
+  if (cosLight < 0.0f && emitter.doubleSided) {
     ng = -ng;
     cosLight = -cosLight;
   }
   if (!(cosLight > 0.0f)) return sample;
-  sample.pdf = choice_.probability(index) / emitter.area * distance2 / cosLight;
-  const TrianglePoint point{part.primitive, emitter.triangle, b};
-  sample.weight = materials_->emission(point) * (materials_->opacity(point) / sample.pdf);
-  sample.target = offsetPoint(q, ng, corner, rays_->translationOf(part.instance));
+  sample.pdf = emitter.densityByArea * distance2 / cosLight;
+  sample.weight = radianceAt(emitter, b) / sample.pdf;
+  sample.target = q + ng * emitter.offsetMeters;
   return sample;
 }
 
 float EmissiveTriangles::pdf(const HitSurface& hit, const Vec3& origin) const {
   const std::int64_t first = rays_->parts()[hit.part].firstEmitter;
-  if (first < 0 || empty()) return 0.0f;
-  const auto index = static_cast<std::size_t>(first) + hit.point.triangle;
+  if (first < 0) return 0.0f;
+  const Emitter& emitter = triangles_[static_cast<std::size_t>(first) + hit.point.triangle];
   const Vec3 toLight = hit.p - origin;
   const float distance2 = glm::dot(toLight, toLight);
   const float cosLight = std::abs(glm::dot(toLight, hit.ng)) / std::sqrt(distance2);
-  return choice_.probability(index) / triangles_[index].area * distance2 / cosLight;
+  return emitter.densityByArea * distance2 / cosLight;
 }
 
 Vec3 emittedTowardsRay(const Materials& materials, const HitSurface& hit) {

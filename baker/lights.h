@@ -67,10 +67,22 @@ class EmissiveTriangles {
 
  private:
   struct Emitter {
+    Vec3 corner{0};  // world
+    Vec3 e1{0};      // to the other corners
+    Vec3 e2{0};
+    Vec3 ng{0};                  // unit, front
+    float offsetMeters = 0.0f;   // of the ends of shadow rays
+    float densityByArea = 0.0f;  // probability of choosing it over its area
     std::uint32_t part = 0;
     std::uint32_t triangle = 0;
-    float area = 0.0f;
+    bool doubleSided = false;
+    bool uniform = false;  // it sends out `radiance` everywhere
+    Vec3 radiance{0};
   };
+  /// Fills all but densityByArea from the part and the triangle; returns the area.
+  float describe(Emitter& emitter) const;
+  Vec3 radianceAt(const Emitter& emitter, Vec2 barycentric) const;
+
   const RayScene* rays_ = nullptr;
   const Materials* materials_ = nullptr;
   std::vector<Emitter> triangles_;

@@ -86,6 +86,12 @@ Vec3 Materials::albedo(const TrianglePoint& point) const {
   return glm::clamp(color, Vec3(0.0f), Vec3(1.0f));
 }
 
+void Materials::prefetchAlbedo(const TrianglePoint& point) const {
+  const Material& m = material(point.primitive->material);
+  if (const Texture* texture = colorTexture(point.primitive->material))
+    texture->prefetch(m.baseColorMap, uvAt(point, m.baseColorMap.uvSet));
+}
+
 Vec3 Materials::emission(const TrianglePoint& point) const {
   const Material& m = material(point.primitive->material);
   if (!emits(point.primitive->material)) return Vec3(0.0f);

@@ -30,6 +30,8 @@ class Materials {
 
   /// Share of light reflected, 0..1: base colour times texture times vertex colour.
   Vec3 albedo(const TrianglePoint& point) const;
+  /// Brings what albedo() will read closer; of no effect on results.
+  void prefetchAlbedo(const TrianglePoint& point) const;
   /// Radiance sent out from the front (and from the back where doubleSided): nits. Alpha is not applied.
   Vec3 emission(const TrianglePoint& point) const;
   /// 0..1: for MASK 0 or 1 (the cut-off applied), for BLEND the share of light that is held.

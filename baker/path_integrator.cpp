@@ -41,14 +41,16 @@ class WaveTracer {
 
  private:
   void startTexels(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count);
-  void startSample(std::uint32_t sample);
-  void lightTexels(std::uint32_t sample);
-  void followPaths(std::uint32_t sample);
-  bool shadeHit(int lane, int depth, std::uint32_t sample);
-  bool scatter(int lane, int depth, std::uint32_t sample);
+  void startSample();
+  void lightTexels();
+  void followPaths();
+  void findHits(int depth);
+  bool shadeHit(int lane, int depth);
+  void endDarkPaths(int depth);
+  bool scatter(int depth);
   void launch(int lane, const Receiver& receiver, const Vec3& dirWorld, float pdf);
   void addLight(int lane, const Vec3& dirTangent, const Vec3& radianceOverPdf);
-  void finishSample(std::uint32_t sample);
+  void finishSample();
   Vec3 rayStart(const SurfacePoint& point) const;
 
   const LightTransport& transport_;
@@ -63,17 +65,27 @@ class WaveTracer {
   std::array<bool, kLanes> covered_{};
   LightLanes lanes_;  // receivers of the light that is sampled next
   std::array<Path, kLanes> paths_;
+  SampleLanes samples_;
+  StratumOrder order_;
   RayPacket rays_;
+  std::array<HitSurface, kLanes> hits_;
   WaveResult result_;
 };
 
 WaveResult WaveTracer::run(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count) {
   startTexels(pageIndex, page, first, count);
-  for (std::uint32_t sample = 0; sample < static_cast<std::uint32_t>(options_.samples); ++sample) {
-    startSample(sample);
-    lightTexels(sample);
-    followPaths(sample);
-    finishSample(sample);
+  const auto samples = static_cast<std::uint32_t>(options_.samples);
+  for (std::uint32_t block = 0; block < samples; block += StratumOrder::kBlock) {
+    const std::uint32_t size = std::min(StratumOrder::kBlock, samples - block);
+    if (options_.stratumOrder) order_.arrange(samples_, kDirection, block, size);
+    for (std::uint32_t step = 0; step < size; ++step) {
+      for (int lane = 0; lane < kLanes; ++lane)
+        samples_.setSample(lane, options_.stratumOrder ? order_.sample(step, lane) : block + step);
+      startSample();
+      lightTexels();
+      followPaths();
+      finishSample();
+    }
   }
   return std::move(result_);
 }
@@ -87,30 +99,32 @@ void WaveTracer::startTexels(std::uint32_t pageIndex, const PageTexels& page, st
     texel.coverage = static_cast<float>(std::min(area, 1.0));
     texel.probed = (first + lane) % PathIntegrator::kProbeStride == 0;
     covered_[lane] = area > 0.0;
-    lanes_.samplers[lane] = TexelSampler(options_.seed, pageIndex, coords_[lane].x, coords_[lane].y);
+    samples_.setTexel(static_cast<int>(lane), TexelSampler(options_.seed, pageIndex, coords_[lane].x, coords_[lane].y));
   }
 }
 
 Vec3 WaveTracer::rayStart(const SurfacePoint& point) const {
   const Surface& surface = atlas_.surfaces[point.triangle.surface];
   const std::uint32_t* corner = surface.indices.data() + std::size_t{3} * point.triangle.triangle;
-  const Vec3 corners[3] = {surface.positions[corner[0]], surface.positions[corner[1]], surface.positions[corner[2]]};
+  const std::array<Vec3, 3> corners = {surface.positions[corner[0]], surface.positions[corner[1]],
+                                       surface.positions[corner[2]]};
   return offsetPoint(point.position, point.geometricNormal, corners, transport_.rays.translationOf(surface.instance));
 }
 
-void WaveTracer::startSample(std::uint32_t sample) {
+void WaveTracer::startSample() {
   rays_.clear();
+  const UnitSquareLanes footprint = samples_.draw2D(kFootprint);
+  const UnitSquareLanes direction = samples_.draw2D(kDirection);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     lanes_.active[lane] = covered_[lane];
     if (!covered_[lane]) continue;
-    const TexelSampler& sampler = lanes_.samplers[lane];
-    const SurfacePoint point = footprints_[lane].sample(sampler.get2D(sample, kFootprint));
+    const SurfacePoint point = footprints_[lane].sample(footprint[static_cast<int>(lane)]);
     Path& path = paths_[lane];
     path = Path{};
     path.frame = point.frame;
     Receiver& receiver = lanes_.receivers[lane];
     receiver = {point.position, point.geometricNormal, point.frame.n, rayStart(point)};
-    path.gatherTangent = sampleGatherHemisphere(sampler.get2D(sample, kDirection));
+    path.gatherTangent = sampleGatherHemisphere(direction[static_cast<int>(lane)]);
     path.gatherPdf = gatherHemispherePdf(path.gatherTangent.z);
     const Vec3 dirWorld = path.frame.fromLocal(path.gatherTangent);
     // A bent shading normal gathers from below the surface too, where nothing arrives.
@@ -139,27 +153,26 @@ void WaveTracer::addLight(int lane, const Vec3& dirTangent, const Vec3& radiance
       path.probes[i] += light * std::max(0.0f, glm::dot(dirTangent, probeNormals()[i]));
 }
 
-void WaveTracer::lightTexels(std::uint32_t sample) {
+void WaveTracer::lightTexels() {
   result_.shadowRays += directLight(
-      transport_, lanes_, sample, 0, options_.gatherMode, [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
+      transport_, lanes_, samples_, 0, options_.gatherMode,
+      [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
       [&](int lane, const Vec3& wi, const Vec3& light) {
         addLight(lane, paths_[static_cast<std::size_t>(lane)].frame.toLocal(wi), light);
       });
 }
 
-void WaveTracer::followPaths(std::uint32_t sample) {
+void WaveTracer::followPaths() {
   for (int depth = 0;; ++depth) {
     transport_.rays.intersect(rays_, depth == 0 ? options_.gatherMode : options_.bounceMode);
-    bool any = false;
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const auto l = static_cast<std::size_t>(lane);
-      lanes_.active[l] = rays_.valid[lane] != 0 && shadeHit(lane, depth, sample);
-      any |= lanes_.active[l];
-    }
-    if (!any) break;
+    findHits(depth);
+    for (int lane = 0; lane < kLanes; ++lane)
+      lanes_.active[static_cast<std::size_t>(lane)] = rays_.valid[lane] != 0 && shadeHit(lane, depth);
+    if (depth >= kRouletteAfter) endDarkPaths(depth);
+    if (std::none_of(lanes_.active.begin(), lanes_.active.end(), [](bool active) { return active; })) break;
     const std::uint32_t pattern = static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver;
     result_.shadowRays += directLight(
-        transport_, lanes_, sample, pattern, options_.bounceMode,
+        transport_, lanes_, samples_, pattern, options_.bounceMode,
         [](float cosTheta) { return cosineHemispherePdf(cosTheta); },
         [&](int lane, const Vec3& wi, const Vec3& light) {
           Path& path = paths_[static_cast<std::size_t>(lane)];
@@ -168,17 +181,22 @@ void WaveTracer::followPaths(std::uint32_t sample) {
         });
     // The last ray of a path only looks for what shines by itself.
     if (depth + 1 == lastDepth_ && !transport_.raysSeeLight()) break;
-    rays_.clear();
-    bool alive = false;
-    for (int lane = 0; lane < kLanes; ++lane)
-      if (lanes_.active[static_cast<std::size_t>(lane)]) alive |= scatter(lane, depth, sample);
-    if (!alive) break;
+    if (!scatter(depth)) break;
   }
+}
+
+/// Looks up the surfaces that the lanes' rays hit before any is shaded, so that the lanes wait for memory together.
+void WaveTracer::findHits(int depth) {
+  for (int lane = 0; lane < kLanes; ++lane)
+    if (rays_.hit(lane)) hits_[static_cast<std::size_t>(lane)] = transport_.rays.surfaceAt(rays_, lane);
+  if (depth == lastDepth_) return;
+  for (int lane = 0; lane < kLanes; ++lane)
+    if (rays_.hit(lane)) transport_.materials.prefetchAlbedo(hits_[static_cast<std::size_t>(lane)].point);
 }
 
 /// What the ray in flight found: adds what shines by itself. Returns whether the path goes on from there; then
 /// lanes_.receivers holds the point and beta its albedo.
-bool WaveTracer::shadeHit(int lane, int depth, std::uint32_t sample) {
+bool WaveTracer::shadeHit(int lane, int depth) {
   const auto l = static_cast<std::size_t>(lane);
   Path& path = paths_[l];
   if (!rays_.hit(lane)) {
@@ -190,7 +208,7 @@ bool WaveTracer::shadeHit(int lane, int depth, std::uint32_t sample) {
         path.beta * transport_.environment.radiance(dir) * misWeight(path.pdf, transport_.environment.pdf(dir));
     return false;
   }
-  const HitSurface hit = transport_.rays.surfaceAt(rays_, lane);
+  const HitSurface& hit = hits_[l];
   if (depth == 0)
     result_.texels[l].sums.countGatherRay(hit.backFace && !transport_.materials.material(hit.material).doubleSided);
   const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
@@ -198,48 +216,59 @@ bool WaveTracer::shadeHit(int lane, int depth, std::uint32_t sample) {
     path.radiance += path.beta * emitted * misWeight(path.pdf, transport_.emissive.pdf(hit, path.origin));
   if (depth == lastDepth_) return false;
   path.beta *= transport_.materials.albedo(hit.point);
-  const float most = std::max({path.beta.x, path.beta.y, path.beta.z});
-  if (most == 0.0f) return false;
-  if (depth >= kRouletteAfter) {
-    const float survival = std::clamp(most, 0.05f, 1.0f);
-    const std::uint32_t pattern = static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver + kRoulette;
-    if (lanes_.samplers[l].get1D(sample, pattern) >= survival) return false;
-    path.beta /= survival;
-  }
-  lanes_.receivers[l] = {hit.p, hit.ng, hit.ns, hit.rayStart};
+  if (path.beta == Vec3(0.0f)) return false;
+  lanes_.receivers[l] = {hit.p, hit.ng, transport_.rays.shadingNormal(hit), transport_.rays.rayStart(hit)};
   return true;
 }
 
-/// Sends the path on by the cosine; returns false where the direction falls below the surface.
-bool WaveTracer::scatter(int lane, int depth, std::uint32_t sample) {
-  const auto l = static_cast<std::size_t>(lane);
-  const Receiver& receiver = lanes_.receivers[l];
-  const std::uint32_t pattern = static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver + kDirection;
-  const Vec3 local = sampleCosineHemisphere(lanes_.samplers[l].get2D(sample, pattern));
-  const Vec3 dirWorld = frameAround(receiver.ns).fromLocal(local);
-  if (!(glm::dot(dirWorld, receiver.ng) > 0.0f)) return false;
-  launch(lane, receiver, dirWorld, cosineHemispherePdf(local.z));
-  return true;
+/// Russian roulette: a path that goes on speaks for those that ended.
+void WaveTracer::endDarkPaths(int depth) {
+  const UnitLanes roulette = samples_.draw1D(static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver + kRoulette);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!lanes_.active[lane]) continue;
+    Vec3& beta = paths_[lane].beta;
+    const float survival = std::clamp(std::max({beta.x, beta.y, beta.z}), 0.05f, 1.0f);
+    lanes_.active[lane] = roulette.u[lane] < survival;
+    beta /= survival;
+  }
+}
+
+/// Sends the active lanes' paths on by the cosine; returns whether any ray is in flight.
+bool WaveTracer::scatter(int depth) {
+  rays_.clear();
+  const UnitSquareLanes direction =
+      samples_.draw2D(static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver + kDirection);
+  bool any = false;
+  for (int lane = 0; lane < kLanes; ++lane) {
+    if (!lanes_.active[static_cast<std::size_t>(lane)]) continue;
+    const Receiver& receiver = lanes_.receivers[static_cast<std::size_t>(lane)];
+    const Vec3 local = sampleCosineHemisphere(direction[lane]);
+    const Vec3 dirWorld = frameAround(receiver.ns).fromLocal(local);
+    if (!(glm::dot(dirWorld, receiver.ng) > 0.0f)) continue;
+    launch(lane, receiver, dirWorld, cosineHemispherePdf(local.z));
+    any = true;
+  }
+  return any;
 }
 
 bool allFinite(const SampleValue& value) {
   return isFinite(value.flat) && isFinite(value.rnm[0]) && isFinite(value.rnm[1]) && isFinite(value.rnm[2]);
 }
 
-void WaveTracer::finishSample(std::uint32_t sample) {
-  const auto batch =
-      static_cast<int>(std::uint64_t{sample} * TexelSums::kBatches / static_cast<std::uint64_t>(options_.samples));
+void WaveTracer::finishSample() {
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (!covered_[lane]) continue;
     Path& path = paths_[lane];
     if (path.radiance != Vec3(0.0f))
       addLight(static_cast<int>(lane), path.gatherTangent, path.radiance / path.gatherPdf);
+    const std::uint32_t sample = samples_.sample(static_cast<int>(lane));
     if (!allFinite(path.value)) {
       result_.nonFinite.push_back({page_, coords_[lane], sample});
       continue;
     }
     TexelResult& texel = result_.texels[lane];
-    texel.sums.add(path.value, batch);
+    texel.sums.add(path.value, static_cast<int>(std::uint64_t{sample} * TexelSums::kBatches /
+                                                static_cast<std::uint64_t>(options_.samples)));
     if (texel.probed)
       for (std::size_t i = 0; i < kProbeNormals; ++i) texel.probes[i] += path.probes[i];
   }

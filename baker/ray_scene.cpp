@@ -23,11 +23,9 @@ T* embreeBuffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std:
   return static_cast<T*>(rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(T), count));
 }
 
-RTCIntersectContext contextFor(TraceMode mode) {
+RTCIntersectContext newContext() {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  context.flags =
-      mode == TraceMode::Coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
   return context;
 }
 
@@ -41,16 +39,6 @@ float rayHash(RTCRayN* ray, unsigned int rays, unsigned int lane, std::uint32_t 
 }
 
 }  // namespace
-
-Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const Vec3 corners[3], const Vec3& translation) {
-  const float largest = std::max({maxAbs(corners[0]), maxAbs(corners[1]), maxAbs(corners[2])}) + maxAbs(translation);
-  const float distance = 8.0f * std::numeric_limits<float>::epsilon() * largest;
-  const Vec3 inwards = (corners[0] - p) + (corners[1] - p) + (corners[2] - p);
-  const float reach = glm::length(inwards);
-  // At most half the way to the centroid, which lies at inwards / 3.
-  const float share = reach > 6.0f * distance ? distance / reach : 1.0f / 6.0f;
-  return p + (ng * distance + inwards * share);
-}
 
 void RayPacket::clear() { std::fill(std::begin(valid), std::end(valid), 0); }
 
@@ -117,7 +105,9 @@ Expected<void> RayScene::buildGeometry() {
     if (!instance.settings.casts) continue;
     const std::uint32_t firstPart = addParts(static_cast<int>(i));
     if (firstPart == parts_.size()) continue;
-    if (uses[static_cast<std::size_t>(instance.mesh)] == 1) {
+    // Embree inverts the transform of what it places itself; what is flat has no inverse.
+    const bool invertible = std::isnormal(glm::determinant(Mat3(instance.worldFromObject)));
+    if (uses[static_cast<std::size_t>(instance.mesh)] == 1 || !invertible) {
       for (std::uint32_t p = firstPart; p < parts_.size(); ++p) {
         auto geometry = triangles(*parts_[p].primitive, &instance.worldFromObject, &parts_[p].worldPositions);
         if (!geometry) return failure("ray tracing: out of memory for the triangles of '" + instance.name + "'");
@@ -128,6 +118,7 @@ Expected<void> RayScene::buildGeometry() {
     }
     const auto shared = meshScene(instance.mesh);
     if (!shared) return shared.error();
+    for (std::uint32_t p = firstPart; p < parts_.size(); ++p) parts_[p].translation = translationOf(parts_[p].instance);
     EmbreeGeometry placed(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
     rtcSetGeometryInstancedScene(placed.get(), *shared);
     rtcSetGeometryTransform(placed.get(), 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, &instance.worldFromObject);
@@ -215,7 +206,7 @@ void RayScene::alphaFilter(const RTCFilterFunctionNArguments* args) {
 }
 
 void RayScene::intersect(RayPacket& rays, TraceMode mode) const {
-  RTCIntersectContext context = contextFor(mode);
+  RTCIntersectContext context = newContext();
   if (mode != TraceMode::Single) {
     rtcIntersect16(rays.valid, top_.get(), &context, &rays.rayhit);
     return;
@@ -238,7 +229,7 @@ void RayScene::intersect(RayPacket& rays, TraceMode mode) const {
 
 void RayScene::occluded(ShadowPacket& rays, TraceMode mode) const {
   if (!rays.any) return;
-  RTCIntersectContext context = contextFor(mode);
+  RTCIntersectContext context = newContext();
   if (mode != TraceMode::Single) {
     rtcOccluded16(rays.valid, top_.get(), &context, &rays.ray);
     return;
@@ -258,17 +249,20 @@ std::uint32_t RayScene::partOf(const RayPacket& rays, int lane) const {
   return partOfGeometry_[instance] + hit.geomID[lane];
 }
 
-Vec3 RayScene::translationOf(int instance) const {
+float RayScene::translationOf(int instance) const {
   const Instance& placed = scene_->instances[static_cast<std::size_t>(instance)];
   const bool byEmbree = placed.settings.casts && meshScenes_[static_cast<std::size_t>(placed.mesh)];
-  return byEmbree ? Vec3(placed.worldFromObject[3]) : Vec3(0.0f);
+  return byEmbree ? maxAbs(Vec3(placed.worldFromObject[3])) : 0.0f;
 }
 
-void RayScene::corners(const ScenePart& part, std::uint32_t triangle, Vec3 out[3]) const {
+std::array<Vec3, 3> RayScene::corners(const ScenePart& part, std::uint32_t triangle) const {
   const std::uint32_t* corner = part.primitive->indices.data() + std::size_t{3} * triangle;
-  for (int i = 0; i < 3; ++i)
-    out[i] = part.worldPositions ? part.worldPositions[corner[i]]
-                                 : Vec3(part.worldFromObject * Vec4(part.primitive->positions[corner[i]], 1.0f));
+  if (part.worldPositions)
+    return {part.worldPositions[corner[0]], part.worldPositions[corner[1]], part.worldPositions[corner[2]]};
+  std::array<Vec3, 3> world;
+  for (std::size_t i = 0; i < 3; ++i)
+    world[i] = Vec3(part.worldFromObject * Vec4(part.primitive->positions[corner[i]], 1.0f));
+  return world;
 }
 
 HitSurface RayScene::surfaceAt(const RayPacket& rays, int lane) const {
@@ -278,31 +272,30 @@ HitSurface RayScene::surfaceAt(const RayPacket& rays, int lane) const {
   const ScenePart& part = parts_[surface.part];
   surface.material = part.primitive->material;
   surface.point = {part.primitive, hit.primID[lane], {hit.u[lane], hit.v[lane]}};
-  Vec3 corner[3];
-  corners(part, hit.primID[lane], corner);
-  const Vec3 e1 = corner[1] - corner[0];
-  const Vec3 e2 = corner[2] - corner[0];
-  surface.p = corner[0] + hit.u[lane] * e1 + hit.v[lane] * e2;
+  surface.corners = corners(part, hit.primID[lane]);
+  const Vec3 e1 = surface.corners[1] - surface.corners[0];
+  const Vec3 e2 = surface.corners[2] - surface.corners[0];
+  surface.p = surface.corners[0] + hit.u[lane] * e1 + hit.v[lane] * e2;
   const Vec3 front = glm::cross(e1, e2) * part.frontSign;
   const Vec3 dir(rays.rayhit.ray.dir_x[lane], rays.rayhit.ray.dir_y[lane], rays.rayhit.ray.dir_z[lane]);
   surface.ng = glm::normalize(front);
   surface.backFace = glm::dot(dir, surface.ng) > 0.0f;
   if (surface.backFace) surface.ng = -surface.ng;
-  surface.rayStart = offsetPoint(surface.p, surface.ng, corner, translationOf(part.instance));
-
-  surface.ns = surface.ng;
-  if (!part.primitive->normals.empty()) {
-    const std::uint32_t* index = part.primitive->indices.data() + std::size_t{3} * hit.primID[lane];
-    const auto& normals = part.primitive->normals;
-    const Vec3 n = part.worldFromNormal * ((1.0f - hit.u[lane] - hit.v[lane]) * normals[index[0]] +
-                                           hit.u[lane] * normals[index[1]] + hit.v[lane] * normals[index[2]]);
-    const float length2 = glm::dot(n, n);
-    if (length2 > 0.0f && std::isfinite(length2)) {
-      surface.ns = n / std::sqrt(length2);
-      if (glm::dot(surface.ns, surface.ng) < 0.0f) surface.ns = -surface.ns;
-    }
-  }
   return surface;
+}
+
+Vec3 RayScene::shadingNormal(const HitSurface& hit) const {
+  const ScenePart& part = parts_[hit.part];
+  const auto& normals = part.primitive->normals;
+  if (normals.empty()) return hit.ng;
+  const std::uint32_t* index = part.primitive->indices.data() + std::size_t{3} * hit.point.triangle;
+  const Vec2 b = hit.point.barycentric;
+  const Vec3 n = part.worldFromNormal *
+                 ((1.0f - b.x - b.y) * normals[index[0]] + b.x * normals[index[1]] + b.y * normals[index[2]]);
+  const float length2 = glm::dot(n, n);
+  if (!(length2 > 0.0f) || !std::isfinite(length2)) return hit.ng;
+  const Vec3 unit = n / std::sqrt(length2);
+  return glm::dot(unit, hit.ng) < 0.0f ? -unit : unit;
 }
 
 }  // namespace lumel

@@ -1,26 +1,27 @@
 // The casting geometry of a scene for rays: Embree's structures, alpha cut-outs, and what lies at a hit.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
 #include "baker/materials.h"
+#include "baker/sample_lanes.h"
 #include "scene/embree.h"
 #include "scene/expected.h"
 #include "scene/scene.h"
 
 namespace lumel {
 
-/// Rays travel in packets of one lane per texel.
-inline constexpr int kLanes = 16;
-
 /// How a packet is traced. Packet answers like Single but for ties and rounding: a bake uses one throughout.
+/// Embree's flag for coherent rays is not offered: with ROBUST and AVX-512, Embree 3.13's rtcOccluded16 never returns
+/// for some packets that are coherent in name only (one ray with a direction component of -1e-16 is enough).
 enum class TraceMode {
-  Single,    // one call per ray: the plain way, kept as the yardstick
-  Packet,    // rtcIntersect16, for rays without much in common
-  Coherent,  // rtcIntersect16 told that its rays lie close together
+  Single,  // one call per ray: the plain way, kept as the yardstick
+  Packet,  // 16 rays per call
 };
 
 /// Up to 16 rays that look for their closest hit. Lanes that are not set are not traced.
@@ -55,20 +56,42 @@ struct ScenePart {
   Mat4 worldFromObject{1.0f};
   Mat3 worldFromNormal{1.0f};      // cofactor matrix times the sign of the determinant: keeps fronts in front
   float frontSign = 1.0f;          // -1 for mirroring instances: triangles wind the other way round in world space
+  float translation = 0.0f;        // for offsetPoint
   std::int64_t firstEmitter = -1;  // of its triangles among EmissiveTriangles; -1: it emits nothing
 };
 
-/// A surface found by a ray, both normals on the side that the ray came from.
+/// A surface found by a ray, its normal on the side that the ray came from.
 struct HitSurface {
   Vec3 p{0};         // world
   Vec3 ng{0, 0, 1};  // geometric normal
-  Vec3 ns{0, 0, 1};  // shading normal; dot(ng, ns) >= 0
-  Vec3 rayStart{0};  // of rays that leave it: offsetPoint
   bool backFace = false;
   int material = 0;
   std::uint32_t part = 0;
   TrianglePoint point;
+  std::array<Vec3, 3> corners;  // of the triangle, world
 };
+
+/// How far rays start off a triangle: a few units in the last place of the largest coordinate that takes part in
+/// finding a point of it (after Waechter and Binder 2019; without their fixed distance near the origin, so that scenes
+/// of any size work). `translation`: largest coordinate of the instance's translation, for geometry that Embree places
+/// itself; 0 else.
+inline float offsetDistance(const std::array<Vec3, 3>& corners, float translation) {
+  const Vec3 largest = glm::max(glm::max(glm::abs(corners[0]), glm::abs(corners[1])), glm::abs(corners[2]));
+  return 8.0f * std::numeric_limits<float>::epsilon() *
+         (std::max(std::max(largest.x, largest.y), largest.z) + translation);
+}
+
+/// The start of a ray that leaves p, a point of the triangle, on the side of ng. It is moved by offsetDistance along
+/// the normal, so that rounding cannot put it behind the surface, and as far towards the triangle's centroid, so that
+/// it cannot lie beyond a wall that stands on the triangle's edge.
+inline Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const std::array<Vec3, 3>& corners, float translation) {
+  const float distance = offsetDistance(corners, translation);
+  const Vec3 inwards = (corners[0] - p) + (corners[1] - p) + (corners[2] - p);
+  const float reach = glm::length(inwards);
+  // At most half the way to the centroid, which lies at inwards / 3.
+  const float share = reach > 6.0f * distance ? distance / reach : 1.0f / 6.0f;
+  return p + (ng * distance + inwards * share);
+}
 
 class RayScene {
  public:
@@ -81,14 +104,28 @@ class RayScene {
 
   /// Precondition: rays.hit(lane).
   HitSurface surfaceAt(const RayPacket& rays, int lane) const;
+  /// Index of the part that was hit. Precondition: rays.hit(lane).
+  std::uint32_t partOf(const RayPacket& rays, int lane) const;
+
+  /// Interpolated, on the side of hit.ng; hit.ng itself where the mesh has no usable normal.
+  Vec3 shadingNormal(const HitSurface& hit) const;
+  /// Where rays that leave the surface start.
+  Vec3 rayStart(const HitSurface& hit) const {
+    return offsetPoint(hit.p, hit.ng, hit.corners, parts_[hit.part].translation);
+  }
 
   const std::vector<ScenePart>& parts() const { return parts_; }
   std::vector<ScenePart>& parts() { return parts_; }
+  /// Primitive `primitive` of the mesh of an instance.
+  const Primitive* primitiveOf(int instance, int primitive) const {
+    return &scene_->primitive(scene_->instances[static_cast<std::size_t>(instance)].mesh, primitive);
+  }
   /// World-space corners, as wound in the primitive.
-  void corners(const ScenePart& part, std::uint32_t triangle, Vec3 out[3]) const;
+  std::array<Vec3, 3> corners(const ScenePart& part, std::uint32_t triangle) const;
 
-  /// For offsetPoint: an instance's translation where Embree places it, zero where its triangles are in world space.
-  Vec3 translationOf(int instance) const;
+  /// For offsetPoint: the largest coordinate of an instance's translation where Embree places it, 0 where its
+  /// triangles are in world space.
+  float translationOf(int instance) const;
 
   Vec3 boundsMin() const { return boundsMin_; }
   Vec3 boundsMax() const { return boundsMax_; }
@@ -106,7 +143,6 @@ class RayScene {
   EmbreeGeometry triangles(const Primitive& primitive, const Mat4* worldFromObject, const Vec3** vertices);
   Expected<RTCScene> meshScene(int mesh);
   static void alphaFilter(const RTCFilterFunctionNArguments* args);
-  std::uint32_t partOf(const RayPacket& rays, int lane) const;
 
   const Scene* scene_;
   const Materials* materials_;
@@ -119,12 +155,5 @@ class RayScene {
   Vec3 boundsMin_{0};
   Vec3 boundsMax_{0};
 };
-
-/// The start of a ray that leaves p, a point of the triangle, on the side of ng. It is moved along the normal so that
-/// rounding cannot put it behind the surface, and as far towards the triangle's centroid, so that it cannot lie beyond
-/// a wall that stands on the triangle's edge. The distance is a few units in the last place of the largest coordinate
-/// that took part in finding p (after Waechter and Binder 2019; without their fixed distance near the origin, so that
-/// scenes of any size work). `translation`: of the instance, for geometry that Embree places itself; zero else.
-Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const Vec3 corners[3], const Vec3& translation);
 
 }  // namespace lumel

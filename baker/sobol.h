@@ -86,6 +86,8 @@ class TexelSampler {
   float get1D(std::uint32_t sample, std::uint32_t pattern) const {
     return sobol1D(sample, hashCombine(seed_, pattern));
   }
+  /// Tells texels apart: to seed further samplers.
+  std::uint32_t seed() const { return seed_; }
 
  private:
   std::uint32_t seed_ = 0;

@@ -7,10 +7,22 @@
 namespace lumel {
 namespace {
 
-struct FrameVertex {  // a vertex of one chart: the key by which copies of one point are found
-  std::array<std::uint32_t, 6> key;  // chart, position, uv
+struct FrameVertex {  // a vertex of one chart, with what its triangles say
+  std::array<std::uint32_t, 4> key;  // chart, position
+  Vec2 uv;
   std::uint32_t surface;
   std::uint32_t vertex;
+  Vec3d tangentSum{0.0};
+  double handedness = 0.0;
+
+  bool operator<(const FrameVertex& o) const {
+    return std::tie(key, uv.x, uv.y, surface, vertex) < std::tie(o.key, o.uv.x, o.uv.y, o.surface, o.vertex);
+  }
+  /// Whether both are copies of one point of the chart: a thousandth of a texel apart is rounding.
+  bool meets(const FrameVertex& o) const {
+    constexpr float kSamePlace = 1e-6f;
+    return key == o.key && std::abs(uv.x - o.uv.x) <= kSamePlace && std::abs(uv.y - o.uv.y) <= kSamePlace;
+  }
 };
 
 double cornerAngle(Vec3d p, Vec3d a, Vec3d b) {
@@ -47,11 +59,49 @@ void setMaterialFrames(const Primitive& primitive, const Mat4& worldFromObject, 
   }
 }
 
-std::array<std::uint32_t, 6> frameKey(const Surface& surface, std::uint32_t chart, std::uint32_t vertex) {
-  const Vec3 p = surface.positions[vertex] + 0.0f;
-  const Vec2 uv = surface.lightmapUvs[vertex] + 0.0f;
-  return {chart, std::bit_cast<std::uint32_t>(p.x), std::bit_cast<std::uint32_t>(p.y), std::bit_cast<std::uint32_t>(p.z),
-          std::bit_cast<std::uint32_t>(uv.x), std::bit_cast<std::uint32_t>(uv.y)};
+/// The surface's vertices with the sums of dP/du over their triangles.
+void addFrameVertices(const Surface& surface, std::uint32_t index, std::vector<FrameVertex>& vertices) {
+  const std::size_t base = vertices.size();
+  for (std::uint32_t i = 0; i < surface.positions.size(); ++i) {
+    const Vec3 p = surface.positions[i] + 0.0f;
+    vertices.push_back({{0, std::bit_cast<std::uint32_t>(p.x), std::bit_cast<std::uint32_t>(p.y), std::bit_cast<std::uint32_t>(p.z)},
+                        surface.lightmapUvs[i], index, i});
+  }
+  for (std::size_t t = 0; t < surface.triangleCount(); ++t) {
+    std::array<Vec3d, 3> p;
+    std::array<Vec2d, 3> uv;
+    const std::uint32_t* v = &surface.indices[3 * t];
+    for (std::size_t k = 0; k < 3; ++k) {
+      p[k] = surface.positions[v[k]];
+      uv[k] = surface.lightmapUvs[v[k]];
+      vertices[base + v[k]].key[0] = surface.charts[t];
+    }
+    Vec3d tangent;
+    double hand = 0;
+    const double trust = uvTangent(p, uv, tangent, hand);
+    if (trust == 0) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double weight = trust * cornerAngle(p[k], p[(k + 1) % 3], p[(k + 2) % 3]);
+      vertices[base + v[k]].tangentSum += weight * tangent;
+      vertices[base + v[k]].handedness += weight * hand;
+    }
+  }
+}
+
+/// Gives all copies of one point the same tangent.
+void setCommonTangent(std::span<const FrameVertex> copies, std::span<Surface> surfaces) {
+  Vec3d sum(0.0), normalSum(0.0);
+  double hand = 0;
+  for (const FrameVertex& copy : copies) {
+    sum += copy.tangentSum;
+    hand += copy.handedness;
+    normalSum += Vec3d(surfaces[copy.surface].normals[copy.vertex]);
+  }
+  const double normalLength = glm::length(normalSum);
+  const Vec3 n = normalLength > 1e-6 ? Vec3(normalSum / normalLength) : surfaces[copies[0].surface].normals[copies[0].vertex];
+  const double length = glm::length(sum);
+  const Vec3 t = frameFromTangent(n, Vec4(length > 0 ? Vec3(sum / length) : Vec3(0.0f), 1.0f)).t;
+  for (const FrameVertex& copy : copies) surfaces[copy.surface].tangents[copy.vertex] = Vec4(t, hand < 0 ? -1.0f : 1.0f);
 }
 
 }  // namespace
@@ -61,61 +111,22 @@ bool hasMaterialFrame(const Primitive& primitive) {
 }
 
 void setBakeFrames(const Scene& scene, std::span<Surface> surfaces) {
-  // Sums of tangents per vertex copy, then over all copies of a chart's point.
   std::vector<FrameVertex> vertices;
-  std::vector<std::vector<Vec3d>> sums(surfaces.size());
-  std::vector<std::vector<double>> handedness(surfaces.size());
   for (std::uint32_t s = 0; s < surfaces.size(); ++s) {
     Surface& surface = surfaces[s];
     const Instance& instance = scene.instances[static_cast<std::size_t>(surface.instance)];
     const Primitive& primitive = scene.primitive(instance.mesh, surface.primitive);
     surface.tangents.assign(surface.positions.size(), Vec4(0, 0, 0, 1));
-    if (hasMaterialFrame(primitive)) {
+    if (hasMaterialFrame(primitive))
       setMaterialFrames(primitive, instance.worldFromObject, surface);
-      continue;
-    }
-    sums[s].assign(surface.positions.size(), Vec3d(0.0));
-    handedness[s].assign(surface.positions.size(), 0.0);
-    std::vector<std::uint32_t> chartOf(surface.positions.size(), 0);
-    for (std::size_t t = 0; t < surface.triangleCount(); ++t) {
-      std::array<Vec3d, 3> p;
-      std::array<Vec2d, 3> uv;
-      const std::uint32_t* v = &surface.indices[3 * t];
-      for (std::size_t k = 0; k < 3; ++k) {
-        p[k] = surface.positions[v[k]];
-        uv[k] = surface.lightmapUvs[v[k]];
-        chartOf[v[k]] = surface.charts[t];
-      }
-      Vec3d tangent;
-      double hand = 0;
-      const double trust = uvTangent(p, uv, tangent, hand);
-      if (trust == 0) continue;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const double angle = trust * cornerAngle(p[k], p[(k + 1) % 3], p[(k + 2) % 3]);
-        sums[s][v[k]] += angle * tangent;
-        handedness[s][v[k]] += angle * hand;
-      }
-    }
-    for (std::uint32_t i = 0; i < surface.positions.size(); ++i) vertices.push_back({frameKey(surface, chartOf[i], i), s, i});
+    else
+      addFrameVertices(surface, s, vertices);
   }
-  std::sort(vertices.begin(), vertices.end(), [](const FrameVertex& a, const FrameVertex& b) {
-    return std::tie(a.key, a.surface, a.vertex) < std::tie(b.key, b.surface, b.vertex);
-  });
-  for (std::size_t first = 0, last; first < vertices.size(); first = last) {
-    Vec3d sum(0.0), normalSum(0.0);
-    double hand = 0;
-    for (last = first; last < vertices.size() && vertices[last].key == vertices[first].key; ++last) {
-      sum += sums[vertices[last].surface][vertices[last].vertex];
-      hand += handedness[vertices[last].surface][vertices[last].vertex];
-      normalSum += Vec3d(surfaces[vertices[last].surface].normals[vertices[last].vertex]);
-    }
-    const double normalLength = glm::length(normalSum);
-    const Vec3 n = normalLength > 1e-6 ? Vec3(normalSum / normalLength)
-                                       : surfaces[vertices[first].surface].normals[vertices[first].vertex];
-    const double length = glm::length(sum);
-    const Vec3 t = frameFromTangent(n, Vec4(length > 0 ? Vec3(sum / length) : Vec3(0.0f), 1.0f)).t;
-    for (std::size_t i = first; i < last; ++i)
-      surfaces[vertices[i].surface].tangents[vertices[i].vertex] = Vec4(t, hand < 0 ? -1.0f : 1.0f);
+  std::sort(vertices.begin(), vertices.end());
+  const std::span<const FrameVertex> all(vertices);
+  for (std::size_t first = 0, last; first < all.size(); first = last) {
+    for (last = first + 1; last < all.size() && all[last].meets(all[first]);) ++last;
+    setCommonTangent(all.subspan(first, last - first), surfaces);
   }
 }
 

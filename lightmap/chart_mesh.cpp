@@ -7,8 +7,8 @@
 namespace lumel {
 namespace {
 
-// A float UV on a page of some thousand texels is known to about 5e-5 texels: thinner flips do not exist in the result.
-constexpr double kFlipTexels = 5e-5;
+// A float UV on a page of some thousand texels is known to about 5e-5 texels: flips a good deal thinner are lost there.
+constexpr double kFlipTexels = 1e-5;
 
 std::uint32_t findRoot(std::vector<std::uint32_t>& parent, std::uint32_t x) {
   while (parent[x] != x) x = parent[x] = parent[parent[x]];

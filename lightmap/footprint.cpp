@@ -98,22 +98,33 @@ Vec3 unitOr(const Vec3d& v, const Vec3& fallback) {
   return length > 1e-150 && std::isfinite(length) ? Vec3(v / length) : fallback;
 }
 
+/// By the winding in space; of a triangle without area there, by its first vertex normal.
+Vec3 geometricNormalOf(const Surface& surface, const std::array<std::uint32_t, 3>& v) {
+  const Vec3d p0(surface.positions[v[0]]);
+  const Vec3d normal = glm::cross(Vec3d(surface.positions[v[1]]) - p0, Vec3d(surface.positions[v[2]]) - p0);
+  return unitOr(normal, unitOr(Vec3d(surface.normals[v[0]]), Vec3(0, 0, 1)));
+}
+
 }  // namespace
 
 double TexelFootprint::clip(const Atlas& atlas, const PageTexels& page, std::size_t texel) {
   atlas_ = &atlas;
   width_ = page.width;
   height_ = page.height;
+  sources_.clear();
   pieces_.clear();
   area_ = 0.0;
   for (const TriangleRef& ref : page.trianglesOf(texel)) {
     const Corners corners = cornersOf(atlas, ref, width_, height_);
     const Polygon polygon = clipToTexel(corners.texels, page.coords[texel]);
+    if (polygon.count < 3) continue;
+    const auto source = static_cast<std::uint32_t>(sources_.size());
+    sources_.push_back({ref, corners.vertices, geometricNormalOf(atlas.surfaces[ref.surface], corners.vertices)});
     for (std::size_t i = 2; i < polygon.count; ++i) {
       const std::array<Vec2d, 3> piece = {polygon.corners[0], polygon.corners[i - 1], polygon.corners[i]};
       const double area = 0.5 * std::abs(cross(piece[1] - piece[0], piece[2] - piece[0]));
       if (!(area > 0)) continue;
-      Piece added{ref, {}, area_, area};
+      Piece added{source, {}, area_, area};
       for (std::size_t k = 0; k < 3; ++k) added.barycentric[k] = barycentricOf(corners.texels, piece[k]);
       pieces_.push_back(added);
       area_ += area;
@@ -139,7 +150,7 @@ SurfacePoint TexelFootprint::sample(Vec2 u) const {
 SurfacePoint TexelFootprint::centroid() const {
   LUMEL_CHECK(!pieces_.empty());
   const auto texelsOf = [&](const Piece& piece) {
-    const Corners corners = cornersOf(*atlas_, piece.triangle, width_, height_);
+    const Corners corners = cornersOf(*atlas_, sources_[piece.source].triangle, width_, height_);
     std::array<Vec2d, 3> points;
     for (std::size_t i = 0; i < 3; ++i) {
       const Vec2d w(piece.barycentric[i]);
@@ -164,36 +175,34 @@ SurfacePoint TexelFootprint::centroid() const {
     nearest = &piece;
     nearestPoint = point;
   }
-  return pointOn(*nearest, barycentricOf(cornersOf(*atlas_, nearest->triangle, width_, height_).texels, nearestPoint));
+  return pointOn(*nearest, barycentricOf(cornersOf(*atlas_, sources_[nearest->source].triangle, width_, height_).texels,
+                                         nearestPoint));
 }
 
 SurfacePoint TexelFootprint::pointOn(const Piece& piece, Vec2 barycentric) const {
-  const Surface& surface = atlas_->surfaces[piece.triangle.surface];
-  std::array<std::uint32_t, 3> v;
-  for (std::size_t i = 0; i < 3; ++i) v[i] = surface.indices[std::size_t{3} * piece.triangle.triangle + i];
-  const double w1 = std::clamp(static_cast<double>(barycentric.x), 0.0, 1.0);
-  const double w2 = std::clamp(static_cast<double>(barycentric.y), 0.0, 1.0 - w1);
-  const double w0 = 1.0 - w1 - w2;
+  const Source& source = sources_[piece.source];
+  const Surface& surface = atlas_->surfaces[source.triangle.surface];
+  const std::array<std::uint32_t, 3>& v = source.vertices;
+  const float w1 = std::clamp(barycentric.x, 0.0f, 1.0f);
+  const float w2 = std::clamp(barycentric.y, 0.0f, 1.0f - w1);
+  const float w0 = 1.0f - w1 - w2;
 
   SurfacePoint point;
-  point.triangle = piece.triangle;
+  point.triangle = source.triangle;
   point.barycentric = Vec3(w0, w1, w2);
+  point.geometricNormal = source.geometricNormal;
+  // Relative to one vertex and in double: far from the origin floats would cancel.
   const Vec3d p0(surface.positions[v[0]]);
   const Vec3d edge1 = Vec3d(surface.positions[v[1]]) - p0;
   const Vec3d edge2 = Vec3d(surface.positions[v[2]]) - p0;
-  point.position = Vec3(p0 + w1 * edge1 + w2 * edge2);
+  point.position = Vec3(p0 + static_cast<double>(w1) * edge1 + static_cast<double>(w2) * edge2);
 
-  const Vec3d normal =
-      w0 * Vec3d(surface.normals[v[0]]) + w1 * Vec3d(surface.normals[v[1]]) + w2 * Vec3d(surface.normals[v[2]]);
-  // Each normal stands in where the other has no direction.
-  const Vec3 geometric = unitOr(glm::cross(edge1, edge2), unitOr(normal, Vec3(0, 0, 1)));
-  point.geometricNormal = geometric;
-  const Vec4 tangent = static_cast<float>(w0) * surface.tangents[v[0]] +
-                       static_cast<float>(w1) * surface.tangents[v[1]] +
-                       static_cast<float>(w2) * surface.tangents[v[2]];
+  const Vec3 normal = w0 * surface.normals[v[0]] + w1 * surface.normals[v[1]] + w2 * surface.normals[v[2]];
+  const float length2 = glm::dot(normal, normal);
+  const bool isSmooth = length2 > 1e-12f && std::isfinite(length2);
   // A chart never mixes handedness, so neither does a triangle: the interpolated w keeps its sign.
-  const bool smooth = glm::dot(normal, normal) > 1e-12;
-  point.frame = frameFromTangent(smooth ? unitOr(normal, geometric) : geometric, tangent);
+  const Vec4 tangent = w0 * surface.tangents[v[0]] + w1 * surface.tangents[v[1]] + w2 * surface.tangents[v[2]];
+  point.frame = frameFromTangent(isSmooth ? normal / std::sqrt(length2) : source.geometricNormal, tangent);
   return point;
 }
 

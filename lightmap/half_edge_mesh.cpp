@@ -109,7 +109,10 @@ class Builder {
 
   void join(std::uint32_t a, std::uint32_t b) {
     bool isHard = false;
-    if (!framesAgree(a, b, isHard)) return;
+    if (!framesAgree(a, b, isHard)) {
+      mesh_.frameBreaks.push_back({a, b});
+      return;
+    }
     opposite_[a] = static_cast<std::int32_t>(b);
     opposite_[b] = static_cast<std::int32_t>(a);
     mesh_.hard[a / 3][a % 3] = mesh_.hard[b / 3][b % 3] = isHard;
@@ -180,6 +183,8 @@ class Builder {
   }
 
   void fillOpenMesh() {
+    // A face that does not fit is told by add_face's result; OpenMesh would also print it.
+    [[maybe_unused]] static const bool quiet = (omerr().disable(), true);
     OpenMeshMesh mesh;
     const std::size_t count = mesh_.sourceTriangle.size();
     mesh.reserve(count / 2 + 3, 3 * count / 2 + 3, count);

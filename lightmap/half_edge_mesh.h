@@ -21,6 +21,12 @@ struct TriangleSoup {
   std::size_t triangleCount() const { return indices.size() / 3; }
 };
 
+/// An edge whose two sides have different frames: corner = 3 * triangle + k of the side from corner k to k + 1.
+struct FrameBreak {
+  std::uint32_t cornerA = 0;
+  std::uint32_t cornerB = 0;
+};
+
 /// The repaired mesh. Triangles of the soup without area are left out and counted; every other one is in.
 struct HalfEdgeMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;  // into `points`
@@ -28,6 +34,7 @@ struct HalfEdgeMesh {
   std::vector<std::array<bool, 3>> hard;                // edge (k, k + 1): the shading normals of its sides differ
   std::vector<Vec3d> points;                            // texels
   std::vector<std::uint32_t> sourceTriangle;            // into the soup
+  std::vector<FrameBreak> frameBreaks;
   std::size_t degenerateTriangles = 0;                  // no area: less than 1e-12 of the longest edge's square
   std::size_t nonManifoldEdges = 0;                     // more than two sides, or two of contrary winding
   std::size_t selfMeetingTriangles = 0;                 // of sheets that meet themselves at both ends of an edge

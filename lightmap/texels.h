@@ -68,8 +68,13 @@ class TexelFootprint {
   SurfacePoint centroid() const;
 
  private:
-  struct Piece {
+  struct Source {  // a triangle of the texel
     TriangleRef triangle;
+    std::array<std::uint32_t, 3> vertices;
+    Vec3 geometricNormal;
+  };
+  struct Piece {
+    std::uint32_t source = 0;         // into sources_
     std::array<Vec2, 3> barycentric;  // of the piece's corners: weights of vertices 1 and 2
     double areaBefore = 0.0;          // summed area of the pieces before this one
     double area = 0.0;
@@ -79,6 +84,7 @@ class TexelFootprint {
   const Atlas* atlas_ = nullptr;
   int width_ = 0;  // of the page
   int height_ = 0;
+  std::vector<Source> sources_;
   std::vector<Piece> pieces_;
   double area_ = 0.0;
 };

@@ -5,6 +5,7 @@
 #include "lightmap/chart_growing.h"
 #include "lightmap/chart_merging.h"
 #include "lightmap/flatten.h"
+#include "lightmap/frame_slits.h"
 #include "scene/parallel.h"
 
 namespace lumel {
@@ -138,6 +139,7 @@ Unwrapped unwrap(const TriangleSoup& soup, const UnwrapOptions& options) {
   for (std::vector<FlatChart>& region : perRegion)
     for (FlatChart& flat : region) charts.push_back(std::move(flat));
   charts = mergeCharts(mesh, std::move(charts), {options.maxStretch, options.largestSide});
+  charts = splitAtFrameSlits(mesh, std::move(charts));
 
   Unwrapped result;
   result.degenerateTriangles = mesh.degenerateTriangles;

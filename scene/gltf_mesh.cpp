@@ -1,11 +1,9 @@
 #include "scene/gltf_mesh.h"
 
 #include <algorithm>
-#include <cctype>
 #include <exception>
 #include <optional>
 
-#include "scene/gltf_accessor.h"
 #include "scene/gltf_attributes.h"
 #include "scene/gltf_extras.h"
 #include "scene/gltf_skin.h"

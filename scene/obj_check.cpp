@@ -1,5 +1,6 @@
 #include "scene/obj_check.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <map>
-#include <tuple>
 #include <unordered_map>
 
 #include "scene/obj_material.h"

@@ -1,6 +1,8 @@
 // Tangents compatible with MikkTSpace: Morten S. Mikkelsen, "Simulation of Wrinkled Surfaces Revisited", thesis,
 // University of Copenhagen 2008, chapter 4: tangents that a vertex's neighbourhood agrees on, that do not depend on
 // the order of triangles or vertices, and that baking tools share, so that a normal map decodes as it was made.
+// Computed on triangles, as glTF asks. A tool that ran on quads before it triangulated has other averages; such a
+// file should bring its own TANGENT.
 #pragma once
 
 #include <cstdint>

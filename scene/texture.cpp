@@ -103,4 +103,22 @@ Vec4 Texture::sample(const TextureRef& ref, Vec2 uv) const {
   return glm::mix(glm::mix(texel(i, j), texel(i + 1, j), fx), glm::mix(texel(i, j + 1), texel(i + 1, j + 1), fx), fy);
 }
 
+void Texture::prefetch(const TextureRef& ref, Vec2 uv) const {
+  const Vec3 transformed = ref.uvMatrix * Vec3(uv, 1.0f);
+  const float x = tameCoordinate(transformed.x) * static_cast<float>(width_) - 0.5f;
+  const float y = tameCoordinate(transformed.y) * static_cast<float>(height_) - 0.5f;
+  const int column = wrapTexel(static_cast<std::int64_t>(std::floor(x)), width_, ref.wrapU);
+  const auto top = static_cast<std::int64_t>(std::floor(y));
+  // Of the footprint's two rows, the left texels: the right ones mostly share their cache lines.
+  for (const std::int64_t row : {top, top + 1}) {
+    const std::size_t at = 4 * (static_cast<std::size_t>(wrapTexel(row, height_, ref.wrapV)) *
+                                    static_cast<std::size_t>(width_) +
+                                static_cast<std::size_t>(column));
+    if (bytes_.empty())
+      __builtin_prefetch(&floats_[at]);
+    else
+      __builtin_prefetch(&bytes_[at]);
+  }
+}
+
 }  // namespace lumel

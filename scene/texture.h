@@ -26,6 +26,8 @@ class Texture {
   Vec4 fetch(int x, int y) const;
   /// Bilinear (or nearest, as ref says) with wrap modes at ref.uvMatrix * uv; texel centres at (i + 0.5) / size.
   Vec4 sample(const TextureRef& ref, Vec2 uv) const;
+  /// Asks the processor to bring the texels that sample() will read closer. No effect on any result.
+  void prefetch(const TextureRef& ref, Vec2 uv) const;
 
  private:
   int width_ = 0;

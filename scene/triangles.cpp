@@ -1,9 +1,7 @@
 #include "scene/triangles.h"
 
 #include <algorithm>
-#include <cstring>
 
-#include "scene/check.h"
 #include "scene/tangents.h"
 #include "scene/vertex_splitter.h"
 

@@ -1,6 +1,7 @@
 // Splits the vertices of an indexed mesh where their corners carry different values (flat normals, tangents).
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <limits>

@@ -66,15 +66,13 @@ TEST(Tangents, SmoothNeighboursAverageByAngleInThePlaneOfTheNormal) {
   for (const Vec4& corner : t) expectNear(Vec3(corner), {1, 0, 0});
 }
 
-TEST(Tangents, AverageWeighsByTheAngleAtTheCorner) {
-  // About the origin: a corner of 90 degrees whose u runs along x, and one of 45 whose u is turned by 90 degrees.
+TEST(Tangents, OppositeWindingsAroundOneVertexStayApart) {
+  // About the origin: a corner of 90 degrees whose u runs along x, and one of 45 that shows the image mirrored.
   const std::vector<Vec3> p = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {-1, 1, 0}};
   const std::vector<Vec3> n(4, kUp);
   const std::vector<Vec2> uv = {{0, 0}, {1, 0}, {0, -1}, {1, -1}};
   const auto t = cornerTangents(p, n, uv, std::vector<std::uint32_t>{0, 1, 2, 0, 2, 3});
-  // Second triangle: edges (0,1) and (-1,1) with image steps (0,1) and (1,1) (v up): dP/du = (-1, 0, 0).
-  // 90 degrees of (1, 0, 0) and 45 of (-1, 0, 0) leave (1, 0, 0) at the shared corners 0 and 2; its winding is
-  // opposite in the image, though, so that they are groups of their own.
+  // Second triangle: steps (0,1) and (-1,1) for image steps (0,1) and (1,1) (v up): dP/du = (-1, 0, 0).
   expectNear(Vec3(t[0]), {1, 0, 0});
   EXPECT_EQ(t[0].w, 1);
   expectNear(Vec3(t[3]), {-1, 0, 0});

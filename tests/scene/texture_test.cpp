@@ -87,8 +87,8 @@ TEST(Texture, TransformAppliesAndWildCoordinatesAreHarmless) {
 
 TEST(Texture, MissingAndBrokenImagesAreErrors) {
   EXPECT_EQ(Texture::decode({"gone", "", {}}, ColorSpace::Srgb).error().message, "gone: the image is missing");
-  auto cut = checker();
-  cut.encoded.resize(cut.encoded.size() / 2);
+  // No cut PNG here: the library's own reader leaks its error text on one (scene_foundation_test has that case).
+  const ImageSource cut{"cut", "image/jpeg", {0xFF, 0xD8, 0xFF, 0xE0, 0, 16, 'J', 'F', 'I', 'F'}};
   auto result = Texture::decode(cut, ColorSpace::Srgb);
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().kind, ErrorKind::Input);

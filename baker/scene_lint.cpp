@@ -1,0 +1,85 @@
+#include "baker/scene_lint.h"
+
+#include "lightmap/lint.h"
+#include "scene/image_io.h"
+
+namespace lumel {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* levelName(LintLevel level) {
+  switch (level) {
+    case LintLevel::Note: return "note";
+    case LintLevel::Warning: return "warning";
+    case LintLevel::Error: return "error";
+  }
+  return "";
+}
+
+Json findingJson(const LintFinding& f) {
+  return {{"id", f.id},
+          {"level", levelName(f.level)},
+          {"count", f.count},
+          {"total", f.total},
+          {"unit", f.unit},
+          {"meaning", f.meaning},
+          {"worst", {{"name", f.worst}, {"page", f.page}, {"x", f.x}, {"y", f.y}, {"value", f.worstValue}}}};
+}
+
+Json sceneUvJson(const UvReport& r) {
+  return {{"name", r.mesh},
+          {"present", r.present},
+          {"valid", r.valid},
+          {"verticesOutOfRange", r.outOfRangeVertices},
+          {"trianglesWithoutArea", r.zeroAreaTriangles},
+          {"overlapTexels", r.overlapTexels},
+          {"coveredTexels", r.coveredTexels},
+          {"frameCrossingTexels", r.frameCrossingTexels}};
+}
+
+Expected<void> writePictures(const Atlas& atlas, const std::filesystem::path& folder) {
+  std::error_code ec;
+  std::filesystem::create_directories(folder, ec);
+  for (int page = 0; page < static_cast<int>(atlas.pages.size()); ++page) {
+    WriteImageOptions options;
+    options.format = PixelFormat::U8;
+    const auto file = folder / ("charts-" + std::to_string(page) + ".png");
+    if (Expected<void> written = writeImage(file, chartPicture(atlas, page), options); !written) return written.error();
+  }
+  return {};
+}
+
+}  // namespace
+
+Expected<Json> lintScene(const Scene& scene, const SceneLintOptions& options) {
+  Progress silent;
+  const Expected<AtlasResult> built = buildAtlas(scene, options.atlas, silent);
+  if (!built) return built.error();
+  const LintReport report = lintAtlas(scene, built->atlas, options.atlas.padding);
+  if (!options.pictures.empty())
+    if (Expected<void> written = writePictures(built->atlas, options.pictures); !written) return written.error();
+
+  Json uvs = Json::array();
+  for (const UvReport& uv : built->report.sceneUvs) uvs.push_back(sceneUvJson(uv));
+  Json findings = Json::array();
+  for (const LintFinding& finding : report.findings)
+    if (finding.count > 0) findings.push_back(findingJson(finding));
+  Json lines = Json::array();
+  for (const std::string& line : lintText(report)) lines.push_back(line);
+  for (const std::string& warning : built->report.warnings) lines.push_back("warning: " + warning);
+  return Json{{"atlas",
+               {{"texelsPerMeter", built->atlas.texelsPerMeter},
+                {"pages", report.pages},
+                {"charts", report.charts},
+                {"pageTexels", report.pageTexels},
+                {"coveredTexels", report.coveredTexels},
+                {"mapBytes", report.mapBytes},
+                {"nonManifoldEdges", built->report.nonManifoldEdges},
+                {"degenerateTriangles", built->report.degenerateTriangles}}},
+              {"sceneUvs", std::move(uvs)},
+              {"findings", std::move(findings)},
+              {"lines", std::move(lines)}};
+}
+
+}  // namespace lumel

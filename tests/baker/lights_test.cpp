@@ -1,0 +1,152 @@
+// Densities of light sampling: what sample() states must be what pdf() answers for the same direction.
+#include "baker/lights.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "baker/environment_light.h"
+#include "baker/sampling.h"
+#include "baker/sobol.h"
+#include "scene/environment.h"
+#include "tests/baker/test_scene.h"
+
+namespace lumel {
+namespace {
+
+using namespace testing_scene;
+
+TEST(EmissiveTriangles, DensityOfAHitIsThatOfTheSample) {
+  TestScene test;
+  const int plain = test.addMaterial(Vec3(0.5f), Vec3(2.0f));
+  const int textured = test.addMaterial(Vec3(0.5f), Vec3(3.0f));
+  Material& m = test.scene.materials[static_cast<std::size_t>(textured)];
+  m.emissionMap.image = test.addImage(2, 1, {{0.2f, 0.2f, 0.2f, 1}, {1, 1, 1, 1}});
+  m.doubleSided = true;
+  test.addRectangle({-2, 3, -1}, {1, 0, 0}, {0, 0.2f, 1}, {.material = plain, .flip = true});
+  test.addRectangle({1, 2, -1}, {0.5f, 0.3f, 0}, {0, 0, -2}, {.material = textured});
+  Mat4 moved(Vec4(0, 1, 0, 0), Vec4(-1, 0, 0, 0), Vec4(0, 0, 0.5f, 0), Vec4(0, 3, 3, 1));
+  test.addInstance(1, moved);
+  std::vector<std::string> notes;
+  const Materials materials(test.scene, true, notes);
+  auto rays = RayScene::build(test.scene, materials);
+  ASSERT_TRUE(rays);
+  const EmissiveTriangles lights(**rays, materials);
+  EXPECT_EQ(lights.size(), 6u);
+  const Vec3 p(0.1f, 0, 0.2f);
+  int met = 0;
+  double flux = 0;
+  constexpr std::uint32_t kSamples = 4096;
+  for (std::uint32_t i = 0; i < kSamples; ++i) {
+    const LightSample s = lights.sample(p, sobol1D(i, 1), sobol2D(i, 2));
+    if (s.weight == Vec3(0.0f)) continue;
+    RayPacket packet;
+    packet.set(0, p, s.wi);
+    (*rays)->intersect(packet, TraceMode::Packet);
+    ASSERT_TRUE(packet.hit(0));
+    const HitSurface hit = (*rays)->surfaceAt(packet, 0);
+    // Another lamp may be in the way; a sample within rounding of an edge may be hit on the other triangle.
+    if (glm::distance(hit.p, s.target) > 1e-3f) continue;
+    ++met;
+    EXPECT_NEAR(lights.pdf(hit, p) / s.pdf, 1.0f, 2e-3f);
+    EXPECT_LT(glm::distance(emittedTowardsRay(materials, hit), s.weight * s.pdf), 2e-3f);
+    flux += static_cast<double>(s.weight.x) / kSamples;
+  }
+  EXPECT_GT(met, 2000);
+  EXPECT_GT(flux, 0.1);
+}
+
+TEST(EmissiveTriangles, NoneWithoutEmission) {
+  TestScene test;
+  const int unlit = test.addMaterial(Vec3(0.5f), Vec3(1.0f));
+  test.scene.materials[static_cast<std::size_t>(unlit)].unlit = true;
+  test.addRectangle({-1, 1, -1}, {2, 0, 0}, {0, 0, 2}, {.material = unlit});
+  test.addRectangle({-1, 2, -1}, {2, 0, 0}, {0, 0, 2},
+                    {.material = test.addMaterial(Vec3(1.0f), Vec3(1.0f)), .casts = false});
+  std::vector<std::string> notes;
+  const Materials materials(test.scene, true, notes);
+  auto rays = RayScene::build(test.scene, materials);
+  ASSERT_TRUE(rays);
+  EXPECT_TRUE(EmissiveTriangles(**rays, materials).empty());
+}
+
+Environment patchySky() {
+  Environment sky;
+  sky.image = Image(32, 16, 3, 0.1f);
+  sky.image.setRgb(5, 0, Vec3(300.0f));  // a sun at the zenith, where cells are thinnest
+  sky.image.setRgb(31, 7, {20, 10, 5});  // bleeds round the seam
+  sky.image.setRgb(12, 15, Vec3(7.0f));
+  for (int x = 0; x < 32; ++x) sky.image.setRgb(x, 11, Vec3(0.0f));
+  sky.rotationDegrees = 77.0f;
+  return sky;
+}
+
+TEST(EnvironmentLight, DensityRoundTripsAndIntegratesToOne) {
+  const Environment sky = patchySky();
+  const EnvironmentLight light(sky);
+  ASSERT_TRUE(light.sampled());
+  int same = 0;
+  constexpr std::uint32_t kSamples = 8192;
+  double mean = 0;
+  for (std::uint32_t i = 0; i < kSamples; ++i) {
+    const LightSample s = light.sample(sobol2D(i, 1));
+    EXPECT_NEAR(glm::length(s.wi), 1.0f, 1e-5f);
+    // A direction within rounding of a cell's border may fall into the next one.
+    same += std::abs(light.pdf(s.wi) / s.pdf - 1.0f) < 1e-4f;
+    mean += static_cast<double>(luminance(s.weight)) / kSamples;
+  }
+  EXPECT_GE(same, static_cast<int>(0.998 * kSamples));
+
+  double integral = 0, radiance = 0;
+  constexpr int kRows = 1024, kColumns = 2048;
+  const double cell = std::numbers::pi / kRows * 2 * std::numbers::pi / kColumns;
+  for (int row = 0; row < kRows; ++row)
+    for (int column = 0; column < kColumns; ++column) {
+      const double polar = std::numbers::pi * (row + 0.5) / kRows,
+                   azimuth = 2 * std::numbers::pi * (column + 0.5) / kColumns;
+      const Vec3 w(static_cast<float>(std::sin(polar) * std::cos(azimuth)), static_cast<float>(std::cos(polar)),
+                   static_cast<float>(std::sin(polar) * std::sin(azimuth)));
+      integral += static_cast<double>(light.pdf(w)) * std::sin(polar) * cell;
+      radiance += static_cast<double>(luminance(environmentRadiance(sky, w))) * std::sin(polar) * cell;
+    }
+  // Midpoints against borders of cells turned by 77 degrees: 1e-3.
+  EXPECT_NEAR(integral, 1.0, 2e-3);
+  EXPECT_NEAR(mean / radiance, 1.0, 3e-3);  // 8192 stratified samples of a weight that varies within cells
+}
+
+TEST(EnvironmentLight, NothingIsBuiltWithoutAnImage) {
+  const EnvironmentLight black((Environment()));
+  EXPECT_FALSE(black.shines());
+  Environment constant;
+  constant.color = Vec3(1.0f);
+  const EnvironmentLight sky(constant);
+  EXPECT_TRUE(sky.shines());
+  EXPECT_FALSE(sky.sampled());
+  EXPECT_EQ(sky.pdf({0, 1, 0}), 0.0f);
+  constant.strength = 0.0f;
+  EXPECT_FALSE(EnvironmentLight(constant).shines());
+}
+
+TEST(PunctualLights, ChoiceIsProportionalToWhatArrives) {
+  Light near, far, behind;
+  near.position = {0, 1, 0};
+  far.position = {0, 3, 0};
+  behind.position = {0, -1, 0};
+  behind.intensity = 100.0f;
+  const PunctualLights lights({behind, near, far}, 10.0f);
+  // Both have the same direction: with u below the near one's share (1 / (1 + 1/9)) it is chosen, and the weight is the
+  // sum of both irradiances either way.
+  for (const float u : {0.0f, 0.5f, 0.89f, 0.91f, 0.999999f}) {
+    const LightSample s = lights.sample({0, 0, 0}, {0, 1, 0}, u);
+    EXPECT_EQ(s.target.y, u < 0.9f ? 1.0f : 3.0f);
+    EXPECT_NEAR(s.weight.x, 1.0f + 1.0f / 9, 1e-5f);
+    EXPECT_EQ(s.pdf, 0.0f);
+  }
+  EXPECT_EQ(PunctualLights({}, 1.0f).size(), 0u);
+  Light off;
+  off.intensity = 0.0f;
+  EXPECT_TRUE(PunctualLights({off}, 1.0f).empty());
+}
+
+}  // namespace
+}  // namespace lumel
