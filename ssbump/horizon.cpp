@@ -11,15 +11,16 @@ namespace {
 
 // Measured against 16k rays on fractal, brick and step fields of amplitudes 8 to 64. Sharp steps need the 12 texels
 // (with 4 their error doubles); 16 steps per octave gain a tenth over 12 for a fifth more time, 8 cost brick joints a
-// third.
-constexpr double kExactReach = 12;               // up to here every edge that the slice crosses is looked at
-constexpr int kStepsPerOctave = 12;              // beyond kUnitReach: maxima over windows as long as the step
-constexpr int kUnitReach = 2 * kStepsPerOctave;  // up to here every crossing along the dominant axis
+// third; beyond 384 texels, where slopes are small, half as many lose nothing.
+constexpr double kExactReach = 12;  // up to here every edge that the slice crosses is looked at
+constexpr int kUnitReach = 24;      // up to here every crossing along the dominant axis
+constexpr int kFineReach = 384;     // up to here 12 steps per octave, beyond 6: maxima over windows as long as the step
 // Where in its window a maximum is taken to be, from the centre, in lengths: a rising slope has it at the far end. A
 // quarter leaves a mean error below 5e-4 on fractals and steps of amplitude 24 (0: darker, 1/2: steps too bright).
 constexpr double kWindowEnd = 0.25;
-constexpr std::size_t kRowsAtOnce = 8;
-constexpr std::size_t kStepsPerGroup = 8;  // between the kernel's looks at whether anything higher can come
+// A block of texels goes through all azimuths before the next: what its far steps read stays in the second cache.
+constexpr int kBlockWidth = 2 * kHorizonBlock, kBlockHeight = 32;
+constexpr std::size_t kStepsPerGroup = 12;  // between the kernel's looks at whether anything higher can come
 
 struct LerpStep {
   int ax, ay, bx, by;  // the two vertices of the crossed edge
@@ -27,15 +28,48 @@ struct LerpStep {
 };
 
 struct BoxStep {
-  int level, x, y;  // level 2k - 1: windows of 2^k along x; 2k: along y
+  int level, x, y;
   float inverseDistance;
 };
+
+/// Distances (along the dominant axis) from begin to twice that, in steps of one window.
+struct Octave {
+  int begin, window;
+  int steps() const { return begin / window; }
+};
+
+std::vector<Octave> octavesTo(int reach) {
+  std::vector<Octave> octaves;
+  for (int begin = kUnitReach; begin < reach; begin *= 2)
+    octaves.push_back({begin, begin < kFineReach ? begin / 12 : begin / 6});
+  return octaves;
+}
+
+/// The level of an octave's windows: level 0 holds the heights, then come windows along x and along y for each octave.
+int levelOf(std::size_t octave, Along along) { return 1 + 2 * static_cast<int>(octave) + (along == Along::Y ? 1 : 0); }
+
+/// Steps sorted by distance, in groups of kStepsPerGroup.
+template <class Step>
+std::vector<StepGroup> groupsOf(const std::vector<Step>& steps) {
+  std::vector<StepGroup> groups;
+  for (std::size_t s = 0; s < steps.size(); s += kStepsPerGroup)
+    groups.push_back({std::min(steps.size(), s + kStepsPerGroup), steps[s].inverseDistance});
+  return groups;
+}
 
 struct Slice {
   std::vector<LerpStep> lerps;
   std::vector<BoxStep> boxes;
+  std::vector<float> fraction, lerpInverse, boxInverse;  // of the steps above, for the kernel
   std::vector<StepGroup> lerpGroups, boxGroups;
   std::vector<LobeSlice> lobes;
+
+  void finish() {
+    for (const LerpStep& s : lerps) fraction.push_back(s.fraction), lerpInverse.push_back(s.inverseDistance);
+    for (const BoxStep& s : boxes) boxInverse.push_back(s.inverseDistance);
+    lerpGroups = groupsOf(lerps);
+    boxGroups = groupsOf(boxes);
+  }
 };
 
 /// The point `distance` along the slice, on the edge from floor to floor + (ex, ey).
@@ -66,16 +100,7 @@ LerpStep crossing(double x, double y, int ex, int ey, double distance) {
   return {ax, ay, bx, by, static_cast<float>(fraction), static_cast<float>(1 / distance)};
 }
 
-/// Steps sorted by distance, in groups of kStepsPerGroup.
-template <class Step>
-std::vector<StepGroup> groupsOf(const std::vector<Step>& steps) {
-  std::vector<StepGroup> groups;
-  for (std::size_t s = 0; s < steps.size(); s += kStepsPerGroup)
-    groups.push_back({std::min(steps.size(), s + kStepsPerGroup), steps[s].inverseDistance});
-  return groups;
-}
-
-Slice makeSlice(double phi, int reach, int levels, std::span<const Lobe> lobes) {
+Slice makeSlice(double phi, int reach, std::span<const Octave> octaves, std::span<const Lobe> lobes) {
   Slice slice;
   const double ux = std::cos(phi), uy = -std::sin(phi);  // image rows run down, b points up
   const auto addLines = [&](double speed, int ex, int ey, double from, double to) {
@@ -97,74 +122,94 @@ Slice makeSlice(double phi, int reach, int levels, std::span<const Lobe> lobes) 
   const double major = alongX ? ux : uy, minor = alongX ? uy : ux;
   addLines(major, alongX ? 0 : 1, alongX ? 1 : 0, exact, std::min<double>(kUnitReach / std::abs(major), reach));
 
-  slice.lerpGroups = groupsOf(slice.lerps);
-
-  for (int level = 1; level <= levels; ++level) {
-    const int box = 1 << level;
-    for (int j = 0; j < kStepsPerOctave; ++j) {
-      // The window covers the whole steps (n + j) box + 1 ... (n + j + 1) box along the dominant axis, about its
-      // centre; its highest texel may be anywhere in it.
-      const double centre = (kStepsPerOctave + j) * box + (box + 1) / 2.0;
-      const double distance = (centre + kWindowEnd * box) / std::abs(major);
+  for (std::size_t o = 0; o < octaves.size(); ++o) {
+    const auto [begin, window] = octaves[o];
+    for (int j = 0; j < octaves[o].steps(); ++j) {
+      // The window covers the whole steps begin + j window + 1 ... begin + (j + 1) window along the dominant axis,
+      // about its centre; its highest texel may be anywhere in it.
+      const double centre = begin + j * window + (window + 1) / 2.0;
+      const double distance = (centre + kWindowEnd * window) / std::abs(major);
       if (centre / std::abs(major) > reach) break;
       // Windows of even width about p reach from p - width / 2: their centre lies half a texel lower.
       const int p = static_cast<int>(std::lround(std::copysign(centre, major) + 0.5));
-      const int m =
-          static_cast<int>(std::lround(centre * minor / std::abs(major) + (MaxLevel::across(box) > 1 ? 0.5 : 0.0)));
+      const double across = centre * minor / std::abs(major);
+      const int m = static_cast<int>(std::lround(across + (MaxLevel::across(window) > 1 ? 0.5 : 0.0)));
       slice.boxes.push_back(
-          {2 * level - (alongX ? 1 : 0), alongX ? p : m, alongX ? m : p, static_cast<float>(1 / distance)});
+          {levelOf(o, alongX ? Along::X : Along::Y), alongX ? p : m, alongX ? m : p, static_cast<float>(1 / distance)});
     }
   }
-  slice.boxGroups = groupsOf(slice.boxes);
+  slice.finish();
   for (const Lobe& lobe : lobes) slice.lobes.emplace_back(lobe, phi);
   return slice;
 }
 
-int levelCount(int reach) {
-  int levels = 0;
-  while ((kStepsPerOctave << (levels + 1)) < reach) ++levels;
-  return levels;
-}
-
-/// The arrays that one row hands to the kernel, refilled for each azimuth.
-struct RowPointers {
-  std::vector<const float*> a, b, box;
-  std::vector<float> fraction, lerpInverse, boxInverse;
-
-  void set(const Slice& slice, const std::vector<MaxLevel>& levels, int x, int y) {
-    a.clear(), b.clear(), box.clear(), fraction.clear(), lerpInverse.clear(), boxInverse.clear();
-    for (const LerpStep& s : slice.lerps) {
-      a.push_back(levels[0].at(x + s.ax, y + s.ay));
-      b.push_back(levels[0].at(x + s.bx, y + s.by));
-      fraction.push_back(s.fraction);
-      lerpInverse.push_back(s.inverseDistance);
-    }
-    for (const BoxStep& s : slice.boxes) {
-      box.push_back(levels[static_cast<std::size_t>(s.level)].at(x + s.x, y + s.y));
-      boxInverse.push_back(s.inverseDistance);
-    }
+/// One block of texels on its way through the azimuths: the sums of its lobes, and where each row finds the heights of
+/// a slice's steps.
+class Block {
+ public:
+  Block(const std::vector<MaxLevel>& levels, const TexelRect& rect, float highest, std::size_t lobeCount)
+      : levels_(levels), rect_(rect), highest_(highest), lobes_(lobeCount) {
+    padded_ = (rect.width + kHorizonBlock - 1) / kHorizonBlock * kHorizonBlock;
+    const auto rows = static_cast<std::size_t>(rect.height), width = static_cast<std::size_t>(padded_);
+    sums_.resize(rows * lobes_ * width);
+    for (std::size_t i = 0; i < rows * lobes_; ++i) sumRows_.push_back(&sums_[i * width]);
+    rows_.resize(rows);
   }
 
-  HorizonRow row(const Slice& slice, const float* own, float highest, float* const* sums, int width) const {
-    HorizonRow r;
-    r.own = own;
-    r.lerpA = a.data();
-    r.lerpB = b.data();
-    r.fraction = fraction.data();
-    r.lerpInverse = lerpInverse.data();
-    r.lerpGroups = slice.lerpGroups.data();
-    r.lerpGroupCount = slice.lerpGroups.size();
-    r.box = box.data();
-    r.boxInverse = boxInverse.data();
-    r.boxGroups = slice.boxGroups.data();
-    r.boxGroupCount = slice.boxGroups.size();
-    r.highest = highest;
-    r.slices = slice.lobes.data();
-    r.channels = slice.lobes.size();
-    r.sums = sums;
-    r.width = width;
-    return r;
+  void add(const Slice& slice, SimdLevel simd) {
+    const std::size_t perRow = 2 * slice.lerps.size() + slice.boxes.size();
+    pointers_.resize(perRow * rows_.size());
+    for (std::size_t r = 0; r < rows_.size(); ++r) rows_[r] = rowOf(slice, static_cast<int>(r), &pointers_[r * perRow]);
+    horizonRows(rows_, simd);
   }
+
+  float sum(int x, int y, std::size_t lobe) const { return sumRows_[static_cast<std::size_t>(y) * lobes_ + lobe][x]; }
+
+ private:
+  HorizonRow rowOf(const Slice& slice, int r, const float** pointers) const {
+    const int y = rect_.y + r;
+    HorizonRow row;
+    row.own = levels_[0].at(rect_.x, y);
+    const float** a = pointers;
+    const float** b = a + slice.lerps.size();
+    const float** box = b + slice.lerps.size();
+    const std::ptrdiff_t stride = levels_[0].rowStride();
+    for (std::size_t s = 0; s < slice.lerps.size(); ++s) {
+      const LerpStep& step = slice.lerps[s];
+      a[s] = row.own + step.ay * stride + step.ax;
+      b[s] = row.own + step.by * stride + step.bx;
+    }
+    for (std::size_t s = 0; s < slice.boxes.size(); ++s) {
+      const BoxStep& step = slice.boxes[s];
+      box[s] = levels_[static_cast<std::size_t>(step.level)].at(rect_.x + step.x, y + step.y);
+    }
+    row.lerpA = a;
+    row.lerpB = b;
+    row.fraction = slice.fraction.data();
+    row.lerpInverse = slice.lerpInverse.data();
+    row.lerpGroups = slice.lerpGroups.data();
+    row.lerpGroupCount = slice.lerpGroups.size();
+    row.box = box;
+    row.boxInverse = slice.boxInverse.data();
+    row.boxGroups = slice.boxGroups.data();
+    row.boxGroupCount = slice.boxGroups.size();
+    row.highest = highest_;
+    row.slices = slice.lobes.data();
+    row.channels = lobes_;
+    row.sums = &sumRows_[static_cast<std::size_t>(r) * lobes_];
+    row.width = padded_;
+    return row;
+  }
+
+  const std::vector<MaxLevel>& levels_;
+  TexelRect rect_;
+  float highest_;
+  std::size_t lobes_;
+  int padded_;
+  std::vector<float> sums_;
+  std::vector<float*> sumRows_;  // [row * lobes + lobe]
+  std::vector<const float*> pointers_;
+  std::vector<HorizonRow> rows_;
 };
 
 }  // namespace
@@ -182,43 +227,30 @@ Horizon::Horizon(const HeightField& field, const HorizonSettings& settings) : se
 }
 
 Image Horizon::occlusion(const TexelRect& rect, std::span<const Lobe> lobes) const {
-  const int levelsUsed = levelCount(settings_.reach);
+  const std::vector<Octave> octaves = octavesTo(settings_.reach);
   std::vector<Slice> slices;
   std::vector<float> open(lobes.size(), 0.0f);  // summed as the kernel sums: flat gives exactly 1
   for (int j = 0; j < settings_.azimuths; ++j) {
-    slices.push_back(makeSlice(sliceAzimuth(j, settings_.azimuths), settings_.reach, levelsUsed, lobes));
+    slices.push_back(makeSlice(sliceAzimuth(j, settings_.azimuths), settings_.reach, octaves, lobes));
     for (std::size_t c = 0; c < lobes.size(); ++c) open[c] += slices.back().lobes[c].open;
   }
   std::vector<MaxLevel> levels;
   levels.emplace_back(rows_, rect, 1, Along::X, kUnitReach + 1, kHorizonBlock);
-  for (int level = 1; level <= levelsUsed; ++level)
+  for (const Octave& octave : octaves)
     for (Along along : {Along::X, Along::Y})
-      levels.emplace_back(rows_, rect, 1 << level, along, (2 * kStepsPerOctave + 1) << level, kHorizonBlock);
-  const int padded = (rect.width + kHorizonBlock - 1) / kHorizonBlock * kHorizonBlock;
-  const auto width = static_cast<std::size_t>(rect.width);
+      levels.emplace_back(rows_, rect, octave.window, along, 2 * octave.begin + octave.window, kHorizonBlock);
   Image out(rect.width, rect.height, static_cast<int>(lobes.size()));
-  parallelFor(static_cast<std::size_t>(rect.height), kRowsAtOnce, [&](std::size_t first, std::size_t last) {
-    RowPointers pointers;
-    const std::size_t rowSums = lobes.size() * static_cast<std::size_t>(padded);
-    std::vector<float> sums((last - first) * rowSums);
-    std::vector<float*> sumRows(lobes.size());
-    // All rows of one azimuth before the next: neighbouring rows meet in the same stored rows of the far levels.
-    for (const Slice& slice : slices)
-      for (std::size_t y = first; y < last; ++y) {
-        const int mapY = rect.y + static_cast<int>(y);
+  const int across = (rect.width + kBlockWidth - 1) / kBlockWidth,
+            down = (rect.height + kBlockHeight - 1) / kBlockHeight;
+  parallelFor(static_cast<std::size_t>(across * down), 1, [&](std::size_t first, std::size_t) {
+    const int x0 = static_cast<int>(first) % across * kBlockWidth, y0 = static_cast<int>(first) / across * kBlockHeight;
+    const int w = std::min(kBlockWidth, rect.width - x0), h = std::min(kBlockHeight, rect.height - y0);
+    Block block(levels, {rect.x + x0, rect.y + y0, w, h}, rows_.field().highest, lobes.size());
+    for (const Slice& slice : slices) block.add(slice, settings_.simd);
+    for (int y = 0; y < h; ++y)
+      for (int x = 0; x < w; ++x)
         for (std::size_t c = 0; c < lobes.size(); ++c)
-          sumRows[c] = &sums[(y - first) * rowSums + c * static_cast<std::size_t>(padded)];
-        pointers.set(slice, levels, rect.x, mapY);
-        horizonRow(pointers.row(slice, levels[0].at(rect.x, mapY), rows_.field().highest, sumRows.data(), padded),
-                   settings_.simd);
-      }
-    for (std::size_t y = first; y < last; ++y)
-      for (std::size_t c = 0; c < lobes.size(); ++c) {
-        const float* in = &sums[(y - first) * rowSums + c * static_cast<std::size_t>(padded)];
-        float* o = out.pixels.data() + y * width * lobes.size() + c;
-        for (std::size_t x = 0; x < width; ++x)
-          o[x * lobes.size()] = open[c] > 0 ? std::clamp(in[x] / open[c], 0.0f, 1.0f) : 1.0f;
-      }
+          out.at(x0 + x, y0 + y)[c] = open[c] > 0 ? std::clamp(block.sum(x, y, c) / open[c], 0.0f, 1.0f) : 1.0f;
   });
   return out;
 }

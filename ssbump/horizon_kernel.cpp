@@ -8,6 +8,7 @@ namespace lumel::ssbump {
 namespace {
 
 #define LUMEL_INLINE inline __attribute__((always_inline))
+#define LUMEL_LAMBDA __attribute__((always_inline))
 
 template <int Lanes>
 struct Simd {
@@ -64,82 +65,87 @@ LUMEL_INLINE void accumulate(const HorizonRow& row, int x, const typename Simd<L
 
 constexpr int kVectors = 4;  // independent chains that hide the latency of the maximum
 
-/// True where no lane of the block can find a higher slope at a distance of 1 / inverse or more.
+/// Whether any lane is above the slope that matters.
 template <int Lanes>
-LUMEL_INLINE bool finished(const typename Simd<Lanes>::Floats* own, const typename Simd<Lanes>::Floats* slope,
-                           float highest, float inverse) {
+LUMEL_INLINE bool anyMatters(const typename Simd<Lanes>::Floats* gain) {
   using Floats = typename Simd<Lanes>::Floats;
-  Floats most = (highest - own[0]) * inverse - slope[0];
-  for (int v = 1; v < kVectors; ++v) {
-    const Floats m = (highest - own[v]) * inverse - slope[v];
-    most = m > most ? m : most;
-  }
+  Floats most = gain[0];
+  for (int v = 1; v < kVectors; ++v) most = gain[v] > most ? gain[v] : most;
   typename Simd<Lanes>::Ints lane;
   for (int i = 0; i < Lanes; ++i) lane[i] = i;
   for (int half = Lanes / 2; half > 0; half /= 2) {
     const Floats other = __builtin_shuffle(most, lane ^ half);
     most = other > most ? other : most;
   }
-  return most[0] <= 0;
+  return most[0] > kSlopeThatMatters;
 }
 
-template <int Lanes>
-LUMEL_INLINE void climb(const HorizonRow& row, int x, const typename Simd<Lanes>::Floats* own,
-                        typename Simd<Lanes>::Floats* slope) {
-  using S = Simd<Lanes>;
-  using Floats = typename S::Floats;
+/// Runs the groups' steps, `height(s, v)` being the height at step s for vector v. Decided texel by texel, whatever its
+/// neighbours in the block: a group that a texel does not need leaves its slope alone. False once none needs more.
+template <int Lanes, class Height>
+LUMEL_INLINE bool climb(const StepGroup* groups, std::size_t groupCount, const float* inverses, float highest,
+                        const typename Simd<Lanes>::Floats* own, typename Simd<Lanes>::Floats* slope,
+                        const Height& height) {
+  using Floats = typename Simd<Lanes>::Floats;
   std::size_t s = 0;
-  for (std::size_t g = 0; g < row.lerpGroupCount; ++g) {
-    if (finished<Lanes>(own, slope, row.highest, row.lerpGroups[g].inverse)) return;
-    for (; s < row.lerpGroups[g].end; ++s) {
-      const float* pa = row.lerpA[s] + x;
-      const float* pb = row.lerpB[s] + x;
-      const float fraction = row.fraction[s], inverse = row.lerpInverse[s];
+  for (std::size_t g = 0; g < groupCount; ++g) {
+    Floats gain[kVectors], higher[kVectors];
+    for (int v = 0; v < kVectors; ++v) {
+      gain[v] = (highest - own[v]) * groups[g].inverse - slope[v];
+      higher[v] = slope[v];
+    }
+    if (!anyMatters<Lanes>(gain)) return false;
+    for (; s < groups[g].end; ++s) {
+      const float inverse = inverses[s];
       for (int v = 0; v < kVectors; ++v) {
-        Floats a, b;
-        S::load(a, pa + v * Lanes);
-        S::load(b, pb + v * Lanes);
-        const Floats t = (a + fraction * (b - a) - own[v]) * inverse;
-        slope[v] = t > slope[v] ? t : slope[v];
+        Floats h;
+        height(s, v, h);
+        const Floats t = (h - own[v]) * inverse;
+        higher[v] = t > higher[v] ? t : higher[v];
       }
     }
+    for (int v = 0; v < kVectors; ++v) slope[v] = gain[v] > kSlopeThatMatters ? higher[v] : slope[v];
   }
-  s = 0;
-  for (std::size_t g = 0; g < row.boxGroupCount; ++g) {
-    if (finished<Lanes>(own, slope, row.highest, row.boxGroups[g].inverse)) return;
-    for (; s < row.boxGroups[g].end; ++s) {
-      const float* p = row.box[s] + x;
-      const float inverse = row.boxInverse[s];
-      for (int v = 0; v < kVectors; ++v) {
-        Floats a;
-        S::load(a, p + v * Lanes);
-        const Floats t = (a - own[v]) * inverse;
-        slope[v] = t > slope[v] ? t : slope[v];
-      }
-    }
-  }
+  return true;
 }
 
 template <int Lanes>
-LUMEL_INLINE void horizonRowBody(const HorizonRow& row) {
+LUMEL_INLINE void horizons(const HorizonRow& row, int x, const typename Simd<Lanes>::Floats* own,
+                           typename Simd<Lanes>::Floats* slope) {
   using S = Simd<Lanes>;
   using Floats = typename S::Floats;
-  for (int x = 0; x < row.width; x += Lanes * kVectors) {
-    Floats own[kVectors], slope[kVectors];
-    for (int v = 0; v < kVectors; ++v) {
-      S::load(own[v], row.own + x + v * Lanes);
-      slope[v] = Floats{};
-    }
-    climb<Lanes>(row, x, own, slope);
-    for (int v = 0; v < kVectors; ++v) accumulate<Lanes>(row, x + v * Lanes, slope[v]);
-  }
+  const auto onEdge = [&](std::size_t s, int v, Floats& h) LUMEL_LAMBDA {
+    Floats b;
+    S::load(h, row.lerpA[s] + x + v * Lanes);
+    S::load(b, row.lerpB[s] + x + v * Lanes);
+    h = h + row.fraction[s] * (b - h);
+  };
+  const auto inWindow = [&](std::size_t s, int v, Floats& h) LUMEL_LAMBDA { S::load(h, row.box[s] + x + v * Lanes); };
+  if (climb<Lanes>(row.lerpGroups, row.lerpGroupCount, row.lerpInverse, row.highest, own, slope, onEdge))
+    climb<Lanes>(row.boxGroups, row.boxGroupCount, row.boxInverse, row.highest, own, slope, inWindow);
 }
 
-void horizonRowBaseline(const HorizonRow& row) { horizonRowBody<4>(row); }
+template <int Lanes>
+LUMEL_INLINE void horizonRowsBody(std::span<const HorizonRow> rows) {
+  using S = Simd<Lanes>;
+  using Floats = typename S::Floats;
+  for (int x = 0; x < rows[0].width; x += Lanes * kVectors)
+    for (const HorizonRow& row : rows) {
+      Floats own[kVectors], slope[kVectors];
+      for (int v = 0; v < kVectors; ++v) {
+        S::load(own[v], row.own + x + v * Lanes);
+        slope[v] = Floats{};
+      }
+      horizons<Lanes>(row, x, own, slope);
+      for (int v = 0; v < kVectors; ++v) accumulate<Lanes>(row, x + v * Lanes, slope[v]);
+    }
+}
+
+void horizonRowsBaseline(std::span<const HorizonRow> rows) { horizonRowsBody<4>(rows); }
 #if defined(__x86_64__)
-__attribute__((target("avx2"))) void horizonRowAvx2(const HorizonRow& row) { horizonRowBody<8>(row); }
-__attribute__((target("avx512f,avx512vl,avx512dq"))) void horizonRowAvx512(const HorizonRow& row) {
-  horizonRowBody<16>(row);
+__attribute__((target("avx2"))) void horizonRowsAvx2(std::span<const HorizonRow> rows) { horizonRowsBody<8>(rows); }
+__attribute__((target("avx512f,avx512vl,avx512dq"))) void horizonRowsAvx512(std::span<const HorizonRow> rows) {
+  horizonRowsBody<16>(rows);
 }
 #endif
 
@@ -154,13 +160,13 @@ SimdLevel bestSimdLevel() {
   return SimdLevel::Baseline;
 }
 
-void horizonRow(const HorizonRow& row, SimdLevel level) {
+void horizonRows(std::span<const HorizonRow> rows, SimdLevel level) {
 #if defined(__x86_64__)
-  if (level == SimdLevel::Avx512) return horizonRowAvx512(row);
-  if (level == SimdLevel::Avx2) return horizonRowAvx2(row);
+  if (level == SimdLevel::Avx512) return horizonRowsAvx512(rows);
+  if (level == SimdLevel::Avx2) return horizonRowsAvx2(rows);
 #endif
   (void)level;
-  horizonRowBaseline(row);
+  horizonRowsBaseline(rows);
 }
 
 }  // namespace lumel::ssbump

@@ -1,6 +1,7 @@
 #include "ssbump/max_levels.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "scene/parallel.h"
 
@@ -85,20 +86,20 @@ void RowMaxima::band(int y0, int y1, int x0, std::span<float> out) const {
 }
 
 MaxLevel::MaxLevel(const RowMaxima& rows, const TexelRect& tile, int length, Along along, int range, int padding)
-    : stride_(std::max(1, along == Along::X ? across(length) / 2 : length / 4)),
+    : shift_(std::countr_zero(static_cast<unsigned>(std::max(1, along == Along::X ? across(length) / 2 : length / 4)))),
       x0_(tile.x - range),
       width_(tile.width + 2 * range + padding) {
   const int windowX = along == Along::X ? length : across(length),
             windowY = along == Along::X ? across(length) : length;
-  firstRow_ = floorDiv(tile.y - range, stride_);
-  const int lastRow = floorDiv(tile.y + tile.height + range + stride_, stride_);
+  firstRow_ = (tile.y - range) >> shift_;
+  const int lastRow = ((tile.y + tile.height + range) >> shift_) + 1;
   const auto count = static_cast<std::size_t>(lastRow - firstRow_ + 1);
   const auto width = static_cast<std::size_t>(width_);
   data_.resize(count * width);
   parallelFor(count, 8, [&](std::size_t begin, std::size_t end) {
     std::vector<float> wide(width + static_cast<std::size_t>(windowX - 1));
     for (std::size_t r = begin; r < end; ++r) {
-      const int y = (firstRow_ + static_cast<int>(r)) * stride_ - windowY / 2;
+      const int y = ((firstRow_ + static_cast<int>(r)) << shift_) - windowY / 2;
       rows.band(y, y + windowY, x0_ - windowX / 2, wide);
       for (int step = 1; step < windowX; step *= 2)
         for (std::size_t i = 0; i + static_cast<std::size_t>(step) < wide.size(); ++i)

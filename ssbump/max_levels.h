@@ -51,15 +51,15 @@ class MaxLevel {
 
   /// Pointer to column x of the stored row nearest to y; valid for the tile's width + padding from there.
   const float* at(int x, int y) const {
-    const int stored = floorDiv(y + stride_ / 2, stride_) - firstRow_;
-    return data_.data() + static_cast<std::size_t>(stored) * static_cast<std::size_t>(width_) +
-           static_cast<std::size_t>(x - x0_);
+    const std::ptrdiff_t stored = ((y + (1 << shift_ >> 1)) >> shift_) - firstRow_;
+    return data_.data() + stored * width_ + (x - x0_);
   }
+  /// From a pointer of the heights themselves (length 1) to the one a row below.
+  std::ptrdiff_t rowStride() const { return width_; }
 
  private:
-  static int floorDiv(int a, int b) { return a >= 0 ? a / b : -((-a + b - 1) / b); }
-
-  int stride_, x0_, width_, firstRow_;
+  int shift_;  // log2 of the stride
+  int x0_, width_, firstRow_;
   std::vector<float> data_;
 };
 

@@ -80,6 +80,7 @@ TEST(ImageIo, PngInMemoryRoundTrips) {
 TEST(ImageIo, PartsMakeTheSameFileAndAnUnfinishedOneLeavesNothing) {
   Image image(5, 7, 3);
   for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = static_cast<float>(i) / 128;
+  fs::remove_all(scratch("").parent_path());  // what an earlier run has left
   const fs::path whole = scratch("whole.png"), parts = scratch("parts.png");
   ASSERT_TRUE(writeImage(whole, image, {.format = PixelFormat::U16, .channelNames = {}, .metadata = {}}));
   const auto rows = [&](int first, int count) {
