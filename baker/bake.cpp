@@ -8,6 +8,7 @@
 #include <limits>
 #include <span>
 
+#include "baker/gather_integrator.h"
 #include "baker/path_integrator.h"
 #include "scene/parallel.h"
 
@@ -15,6 +16,9 @@ namespace lumel {
 namespace {
 
 constexpr std::size_t kMostNotes = 10;
+
+/// Bounces of the path integrator where all that matter are asked for; Russian roulette ends paths well before.
+constexpr int kLongestPath = 64;
 
 /// Denormals are flushed while it lives: they are far below any light that a map can show and slow rays down.
 class FlushDenormals {
@@ -56,26 +60,37 @@ struct WaveStats {
   std::size_t residuals = 0;
 };
 
-void storeTexel(BakedPage& page, TexelCoord at, const TexelResult& texel, Projection projection, WaveStats& stats) {
-  const SampleValue mean = texel.sums.mean();
-  const std::array<Vec3, 3> rnm = finishTexel(projection, mean.rnm, mean.flat);
+BakedTexel bakedTexel(const TexelResult& texel) {
+  BakedTexel baked{.value = texel.sums.mean(),
+                   .coverage = texel.coverage,
+                   .validity = texel.sums.validity(),
+                   .standardError = texel.sums.standardError(),
+                   .samples = texel.sums.count(),
+                   .probed = texel.probed && texel.sums.count() > 0};
+  if (baked.probed)
+    for (std::size_t i = 0; i < kProbeNormals; ++i)
+      baked.probes[i] = Vec3(texel.probes[i] / static_cast<double>(baked.samples));
+  return baked;
+}
+
+void storeTexel(BakedPage& page, TexelCoord at, const BakedTexel& texel, Projection projection, WaveStats& stats) {
+  if (!(texel.coverage > 0.0f)) return;
+  const std::array<Vec3, 3> rnm = finishTexel(projection, texel.value.rnm, texel.value.flat);
   for (std::size_t i = 0; i < 3; ++i) page.rnm[i].setRgb(at.x, at.y, rnm[i]);
-  page.flat.setRgb(at.x, at.y, mean.flat);
-  const float validity = texel.sums.validity();
-  const float standardError = texel.sums.standardError();
+  page.flat.setRgb(at.x, at.y, texel.value.flat);
   float* aux = page.aux.at(at.x, at.y);
   aux[0] = texel.coverage;
-  aux[1] = validity;
-  aux[2] = standardError;
-  aux[3] = static_cast<float>(texel.sums.count());
-  if (validity < 0.5f) return;
+  aux[1] = texel.validity;
+  aux[2] = texel.standardError;
+  aux[3] = static_cast<float>(texel.samples);
+  if (texel.validity < 0.5f) return;
   ++stats.validTexels;
-  stats.luminance += static_cast<double>(luminance(mean.flat));
-  stats.standardError += static_cast<double>(standardError);
-  if (!texel.probed || texel.sums.count() == 0) return;
+  stats.luminance += static_cast<double>(luminance(texel.value.flat));
+  stats.standardError += static_cast<double>(texel.standardError);
+  if (!texel.probed) return;
   for (std::size_t i = 0; i < kProbeNormals; ++i) {
-    const Vec3 truth(texel.probes[i] / static_cast<double>(texel.sums.count()));
-    const auto difference = static_cast<double>(luminance(decodeRnm(rnm, probeNormals()[i])) - luminance(truth));
+    const auto difference =
+        static_cast<double>(luminance(decodeRnm(rnm, probeNormals()[i])) - luminance(texel.probes[i]));
     stats.residualSquares += difference * difference;
     ++stats.residuals;
   }
@@ -123,27 +138,36 @@ std::vector<BakedPage> emptyPages(const Atlas& atlas) {
   return pages;
 }
 
-}  // namespace
+Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
+                                        const std::vector<PageTexels>& texels, const BakeOptions& options,
+                                        std::vector<BakedPage>& pages, Progress& progress) {
+  GatherIntegrator integrator(
+      transport, kernels, atlas, texels,
+      {.samples = std::max(1, options.samples), .bounces = options.bounces, .seed = options.seed});
+  if (auto done = integrator.run(progress); !done) return done.error();
+  const std::vector<Wave> waves = wavesOf(texels);
+  std::vector<WaveStats> waveStats(waves.size() + 1);
+  parallelFor(waves.size(), 64, [&](std::size_t first, std::size_t last) {
+    for (std::size_t w = first; w < last; ++w)
+      for (std::size_t i = waves[w].first; i < waves[w].first + waves[w].count; ++i)
+        storeTexel(pages[waves[w].page], texels[waves[w].page].coords[i], integrator.texel(waves[w].page, i),
+                   options.projection, waveStats[w]);
+  });
+  waveStats.back().rays = integrator.rays();
+  waveStats.back().shadowRays = integrator.shadowRays();
+  waveStats.back().nonFinite = integrator.nonFinite().size();
+  waveStats.back().firstNonFinite = integrator.nonFinite();
+  return waveStats;
+}
 
-Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
-                          const BakeOptions& options, Progress& progress) {
-  const auto start = std::chrono::steady_clock::now();
-  std::vector<std::string> notes;
-  const Materials materials(scene, options.bounces > 0, notes);
-  auto rays = RayScene::build(scene, materials);
-  if (!rays) return rays.error();
-  const float extent = glm::length((*rays)->boundsMax() - (*rays)->boundsMin());
-  const PunctualLights punctual(scene.lights, extent);
-  const EmissiveTriangles emissive(**rays, materials);
-  const EnvironmentLight environment(scene.environment);
-  const LightTransport transport{**rays, materials, punctual, emissive, environment};
-  const RnmKernels kernels(options.projection);
-  const PathIntegrator integrator(
-      transport, kernels, atlas,
-      {.samples = std::max(1, options.samples), .bounces = std::max(0, options.bounces), .seed = options.seed});
-
-  BakeResult result;
-  result.pages = emptyPages(atlas);
+Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, const RnmKernels& kernels,
+                                            const Atlas& atlas, const std::vector<PageTexels>& texels,
+                                            const BakeOptions& options, std::vector<BakedPage>& pages,
+                                            Progress& progress) {
+  const PathIntegrator integrator(transport, kernels, atlas,
+                                  {.samples = std::max(1, options.samples),
+                                   .bounces = options.bounces < 0 ? kLongestPath : options.bounces,
+                                   .seed = options.seed});
   const std::vector<Wave> waves = wavesOf(texels);
   std::vector<WaveStats> waveStats(waves.size());
   std::uint64_t texelCount = 0;
@@ -163,16 +187,41 @@ Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vec
       done.nonFinite.resize(std::min(done.nonFinite.size(), kMostNotes));
       stats.firstNonFinite = std::move(done.nonFinite);
       for (std::size_t i = 0; i < wave.count; ++i)
-        if (done.texels[i].coverage > 0.0f)
-          storeTexel(result.pages[wave.page], page.coords[wave.first + i], done.texels[i], options.projection, stats);
+        storeTexel(pages[wave.page], page.coords[wave.first + i], bakedTexel(done.texels[i]), options.projection,
+                   stats);
       progress.advance(wave.count);
     }
   });
   progress.end();
   if (progress.cancelled()) return interrupted();
+  return waveStats;
+}
 
-  result.stats = sumUp(waveStats, options.seed);
-  result.stats.texels = texelCount;
+}  // namespace
+
+Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                          const BakeOptions& options, Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<std::string> notes;
+  const Materials materials(scene, options.bounces != 0, notes);
+  auto rays = RayScene::build(scene, materials);
+  if (!rays) return rays.error();
+  const float extent = glm::length((*rays)->boundsMax() - (*rays)->boundsMin());
+  const PunctualLights punctual(scene.lights, extent);
+  const EmissiveTriangles emissive(**rays, materials);
+  const EnvironmentLight environment(scene.environment);
+  const LightTransport transport{**rays, materials, punctual, emissive, environment};
+  const RnmKernels kernels(options.projection);
+
+  BakeResult result;
+  result.pages = emptyPages(atlas);
+  const auto waveStats = options.integrator == Integrator::Gather
+                             ? gather(transport, kernels, atlas, texels, options, result.pages, progress)
+                             : tracePaths(transport, kernels, atlas, texels, options, result.pages, progress);
+  if (!waveStats) return waveStats.error();
+
+  result.stats = sumUp(*waveStats, options.seed);
+  for (const PageTexels& page : texels) result.stats.texels += page.size();
   result.stats.notes.insert(result.stats.notes.begin(), notes.begin(), notes.end());
   result.stats.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;

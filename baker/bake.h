@@ -16,9 +16,18 @@
 
 namespace lumel {
 
+enum class Integrator {
+  Gather,  // progressive final gather: clean at few samples, with a small bias (README)
+  Path,    // path tracing: unbiased, the reference
+};
+
+/// As many indirect bounces as matter.
+inline constexpr int kAllBounces = -1;
+
 struct BakeOptions {
-  int samples = 256;  // gather rays per texel; rounded up to a power of two would waste: any count >= 1
-  int bounces = 4;    // indirect bounces; 0 = direct light only
+  Integrator integrator = Integrator::Gather;
+  int samples = 256;          // gather rays per texel; rounded up to a power of two would waste: any count >= 1
+  int bounces = kAllBounces;  // indirect bounces; 0 = direct light only
   std::uint64_t seed = 1;
   Projection projection = Projection::Flat;
 };
@@ -51,7 +60,7 @@ struct BakeResult {
   BakeStats stats;
 };
 
-/// Path traces every covered texel. The result depends on scene, atlas and options alone, bit for bit, never on the
+/// Finds the light at every covered texel. The result depends on scene, atlas and options alone, bit for bit, never on the
 /// number of threads. Errors: Failed (Embree, memory), Interrupted.
 Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
                           const BakeOptions& options, Progress& progress);

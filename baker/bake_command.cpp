@@ -53,8 +53,11 @@ void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas) {
 
 void declareLightOptions(OptionTable& options, BakeArguments& a) {
   options.group("Light");
+  options.choice("integrator", a.bake.integrator, {"gather", "path"},
+                 "Light from other texels (gather), or every path to its end: unbiased and slow (path)");
   options.integer("samples", a.bake.samples, {1, 1 << 24}, "Gather rays per texel");
-  options.integer("bounces", a.bake.bounces, {0, 1024}, "Indirect bounces; 0: direct light only");
+  options.integer("bounces", a.bake.bounces, {0, 1024}, "Indirect bounces; 0: direct light only").defaultText =
+      "all that matter";
   options.color("sky-color", a.skyColor, {0.0f}, "Radiance of an even sky in nits, red green blue [none]");
   options.path("sky", a.sky, "Sky image: equirectangular .hdr or .exr [none]");
   options

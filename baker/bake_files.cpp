@@ -142,7 +142,7 @@ std::map<std::string, std::string> pageMetadata(std::size_t page, const std::str
   metadata["lumel:page"] = std::to_string(page);
   metadata["lumel:map"] = kind;
   metadata["lumel:samples"] = std::to_string(record.bakeOptions.samples);
-  metadata["lumel:bounces"] = std::to_string(record.bakeOptions.bounces);
+  metadata["lumel:bounces"] = record.bakeOptions.bounces < 0 ? "all" : std::to_string(record.bakeOptions.bounces);
   metadata["lumel:seed"] = std::to_string(record.bakeOptions.seed);
   metadata["lumel:dilate"] = std::to_string(record.dilate);
   if (kind == "aux") {

@@ -104,6 +104,8 @@ class RayScene {
 
   /// Precondition: rays.hit(lane).
   HitSurface surfaceAt(const RayPacket& rays, int lane) const;
+  /// Index of the part that was hit. Precondition: rays.hit(lane).
+  std::uint32_t partOf(const RayPacket& rays, int lane) const;
 
   /// Interpolated, on the side of hit.ng; hit.ng itself where the mesh has no usable normal.
   Vec3 shadingNormal(const HitSurface& hit) const;
@@ -114,6 +116,10 @@ class RayScene {
 
   const std::vector<ScenePart>& parts() const { return parts_; }
   std::vector<ScenePart>& parts() { return parts_; }
+  /// Primitive `primitive` of the mesh of an instance.
+  const Primitive* primitiveOf(int instance, int primitive) const {
+    return &scene_->primitive(scene_->instances[static_cast<std::size_t>(instance)].mesh, primitive);
+  }
   /// World-space corners, as wound in the primitive.
   std::array<Vec3, 3> corners(const ScenePart& part, std::uint32_t triangle) const;
 
@@ -137,7 +143,6 @@ class RayScene {
   EmbreeGeometry triangles(const Primitive& primitive, const Mat4* worldFromObject, const Vec3** vertices);
   Expected<RTCScene> meshScene(int mesh);
   static void alphaFilter(const RTCFilterFunctionNArguments* args);
-  std::uint32_t partOf(const RayPacket& rays, int lane) const;
 
   const Scene* scene_;
   const Materials* materials_;

@@ -93,7 +93,9 @@ void TestScene::addInstance(int instance, const Mat4& worldFromObject, bool rece
 Expected<BakeResult> TestScene::tryBake(const BakeOptions& options, int threads) const {
   const ThreadLimit limit(threads);
   Progress silent;
-  return lumel::bake(scene, atlas, findTexels(atlas), options, silent);
+  BakeOptions chosen = options;
+  chosen.integrator = integrator;
+  return lumel::bake(scene, atlas, findTexels(atlas), chosen, silent);
 }
 
 BakeResult TestScene::bake(const BakeOptions& options, int threads) const {
@@ -104,6 +106,36 @@ BakeResult TestScene::bake(const BakeOptions& options, int threads) const {
   }
   EXPECT_EQ(result->stats.nonFiniteSamples, 0u);
   return *std::move(result);
+}
+
+TestScene busyRoom(float scale, const Vec3& offset) {
+  TestScene test;
+  const auto at = [&](float x, float y, float z) { return offset + scale * Vec3(x, y, z); };
+  const int wall = test.addMaterial({0.7f, 0.5f, 0.3f});
+  const int lamp = test.addMaterial(Vec3(0.2f), {4, 3, 2});
+  const int leaf = test.addMaterial({0.3f, 0.8f, 0.2f});
+  test.addRectangle(at(0, 0, 4), scale * Vec3(4, 0, 0), scale * Vec3(0, 0, -4), {.material = wall, .texels = 13});
+  test.addRectangle(at(0, 0, 0), scale * Vec3(4, 0, 0), scale * Vec3(0, 3, 0), {.material = wall, .texels = 9});
+  test.addRectangle(at(1, 2.5f, 1), scale * Vec3(1, 0, 0), scale * Vec3(0, 0, 1), {.material = lamp});
+  Material& m = test.scene.materials[static_cast<std::size_t>(leaf)];
+  m.alphaMode = AlphaMode::Mask;
+  m.doubleSided = true;
+  m.baseColorMap.image = test.addImage(2, 2, {{1, 1, 1, 1}, {1, 1, 1, 0}, {1, 1, 1, 0}, {1, 1, 1, 1}});
+  m.baseColorMap.nearest = true;
+  test.addRectangle(at(2, 1, 2), scale * Vec3(1, 0, 0), scale * Vec3(0, 0, -1), {.material = leaf});
+  Mat4 moved(1.0f);
+  moved[3] = Vec4(scale * Vec3(1, 0.5f, 0.5f), 1.0f);
+  test.addInstance(3, moved);
+  Light point;
+  point.position = at(3, 2, 3);
+  point.intensity = 2.0f * scale * scale;
+  Light sun;
+  sun.type = LightType::Directional;
+  sun.direction = glm::normalize(Vec3(-0.3f, -1.0f, -0.2f));
+  test.scene.lights = {point, sun};
+  test.scene.environment.image = Image(32, 16, 3, 0.2f);
+  test.scene.environment.image.setRgb(7, 3, Vec3(50.0f));
+  return test;
 }
 
 namespace {

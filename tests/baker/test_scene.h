@@ -23,6 +23,7 @@ struct RectangleOptions {
 struct TestScene {
   Scene scene;
   Atlas atlas;
+  Integrator integrator = Integrator::Path;  // what tryBake uses, whatever its options say
 
   TestScene() { scene.materials.emplace_back(); }
   int addMaterial(const Vec3& albedo, const Vec3& emission = Vec3(0.0f));
@@ -41,6 +42,9 @@ struct TestScene {
   /// The same, and a failed bake fails the test.
   BakeResult bake(const BakeOptions& options, int threads = 0) const;
 };
+
+/// A room with every kind of light, a cut-out and instances.
+TestScene busyRoom(float scale = 1.0f, const Vec3& offset = Vec3(0.0f));
 
 /// Irradiance / pi on a surface of a polygon of radiance 1, by Lambert's formula, weighed by max(0, w.kernelAxis) over
 /// the hemisphere above `normal`: the polygon is clipped by both horizons. Corners in any order round it.

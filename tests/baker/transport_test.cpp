@@ -27,37 +27,6 @@ bool sameBytes(const BakeResult& a, const BakeResult& b) {
          a.stats.meanFlat == b.stats.meanFlat && a.stats.projectionResidual == b.stats.projectionResidual;
 }
 
-/// A room with every kind of light, a cut-out, glass and instances.
-TestScene busyRoom(float scale = 1.0f, const Vec3& offset = Vec3(0.0f)) {
-  TestScene test;
-  const auto at = [&](float x, float y, float z) { return offset + scale * Vec3(x, y, z); };
-  const int wall = test.addMaterial({0.7f, 0.5f, 0.3f});
-  const int lamp = test.addMaterial(Vec3(0.2f), {4, 3, 2});
-  const int leaf = test.addMaterial({0.3f, 0.8f, 0.2f});
-  test.addRectangle(at(0, 0, 4), scale * Vec3(4, 0, 0), scale * Vec3(0, 0, -4), {.material = wall, .texels = 13});
-  test.addRectangle(at(0, 0, 0), scale * Vec3(4, 0, 0), scale * Vec3(0, 3, 0), {.material = wall, .texels = 9});
-  test.addRectangle(at(1, 2.5f, 1), scale * Vec3(1, 0, 0), scale * Vec3(0, 0, 1), {.material = lamp});
-  Material& m = test.scene.materials[static_cast<std::size_t>(leaf)];
-  m.alphaMode = AlphaMode::Mask;
-  m.doubleSided = true;
-  m.baseColorMap.image = test.addImage(2, 2, {{1, 1, 1, 1}, {1, 1, 1, 0}, {1, 1, 1, 0}, {1, 1, 1, 1}});
-  m.baseColorMap.nearest = true;
-  test.addRectangle(at(2, 1, 2), scale * Vec3(1, 0, 0), scale * Vec3(0, 0, -1), {.material = leaf});
-  Mat4 moved(1.0f);
-  moved[3] = Vec4(scale * Vec3(1, 0.5f, 0.5f), 1.0f);
-  test.addInstance(3, moved);
-  Light point;
-  point.position = at(3, 2, 3);
-  point.intensity = 2.0f * scale * scale;
-  Light sun;
-  sun.type = LightType::Directional;
-  sun.direction = glm::normalize(Vec3(-0.3f, -1.0f, -0.2f));
-  test.scene.lights = {point, sun};
-  test.scene.environment.image = Image(32, 16, 3, 0.2f);
-  test.scene.environment.image.setRgb(7, 3, Vec3(50.0f));
-  return test;
-}
-
 TEST(Transport, SameBytesForAnyThreadCount) {
   const TestScene test = busyRoom();
   const BakeOptions options{.samples = 48, .bounces = 3};

@@ -1,0 +1,286 @@
+#include "baker/gather_integrator.h"
+
+#include <xmmintrin.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "scene/parallel.h"
+
+namespace lumel {
+namespace {
+
+constexpr std::uint32_t kFirstPass = 8;
+/// Endless light: the warm-up ends where another bounce adds less than this share, or after so many.
+constexpr double kSettled = 1e-4;
+constexpr int kMostSweeps = 256;
+/// Longest path through surfaces without texels, where bounces have no end of their own.
+constexpr int kLongestPath = 64;
+constexpr std::size_t kSweepGrain = 4096;
+
+CacheLevels levelsFor(int bounces) {
+  if (bounces < 0) return {.count = 1, .base = 0, .endless = true};
+  const int count = std::min(bounces, CacheLevels::kMost);
+  return {.count = count, .base = bounces - count, .endless = false};
+}
+
+}  // namespace
+
+GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
+                                   const std::vector<PageTexels>& texels, const GatherOptions& options)
+    : options_(options),
+      map_(transport.rays, atlas, texels),
+      scene_{.transport = transport, .kernels = kernels, .atlas = atlas, .texels = texels, .map = map_} {
+  const int bounces = transport.dark() ? 0 : options.bounces;
+  scene_.seed = options.seed;
+  scene_.bounces = bounces;
+  scene_.lastDepth = bounces < 0 ? kLongestPath : bounces;
+  scene_.levels = levelsFor(bounces);
+  for (std::uint32_t p = 0; p < texels.size(); ++p)
+    for (std::size_t first = 0; first < texels[p].size(); first += kLanes)
+      waves_.push_back({p, static_cast<std::uint32_t>(first),
+                        static_cast<std::uint32_t>(std::min<std::size_t>(kLanes, texels[p].size() - first))});
+  const std::size_t count = map_.size();
+  sums_.resize(count);
+  coverage_.resize(count);
+  backFaces_.resize(count);
+  reflectance_.resize(count);
+  cache_.resize(count * stored());
+  if (!scene_.levels.endless) levelSums_.resize(count * stored());
+  std::size_t probes = 0;
+  for (const PageTexels& page : texels) {
+    firstProbe_.push_back(probes);
+    probes += (page.size() + PathIntegrator::kProbeStride - 1) / PathIntegrator::kProbeStride;
+  }
+  probes_.resize(probes);
+}
+
+/// Calls body(wave index, GatheredWave&) for all waves; what they count is added up in their order.
+template <class Body>
+Expected<void> GatherIntegrator::forEachWave(Progress& progress, Body body) {
+  struct Counts {
+    std::uint64_t rays = 0;
+    std::uint64_t shadowRays = 0;
+    std::vector<NonFiniteSample> nonFinite;
+  };
+  std::vector<Counts> counts(waves_.size());
+  parallelFor(waves_.size(), 1, [&](std::size_t first, std::size_t last) {
+    const unsigned int saved = _mm_getcsr();
+    _mm_setcsr(saved | 0x8040u);  // FTZ | DAZ: denormals are far below any light and slow rays down
+    for (std::size_t w = first; w < last && !progress.cancelled(); ++w) {
+      GatheredWave done = body(w);
+      counts[w] = {done.rays, done.shadowRays, std::move(done.nonFinite)};
+    }
+    _mm_setcsr(saved);
+  });
+  if (progress.cancelled()) return interrupted();
+  for (const Counts& c : counts) {
+    rays_ += c.rays;
+    shadowRays_ += c.shadowRays;
+    nonFinite_.insert(nonFinite_.end(), c.nonFinite.begin(), c.nonFinite.end());
+  }
+  return {};
+}
+
+Expected<void> GatherIntegrator::run(Progress& progress) {
+  const auto samples = static_cast<std::uint32_t>(options_.samples);
+  progress.begin("bake", map_.size() * std::uint64_t{samples});
+  if (scene_.levels.count > 0)
+    if (auto warm = warmUp(progress); !warm) return warm;
+  for (std::uint32_t first = 0; first < samples;) {
+    const std::uint32_t end = std::min(samples, std::max(kFirstPass, 2 * first));
+    if (auto done = pass(first, end, progress); !done) return done;
+    first = end;
+  }
+  estimateErrors();
+  progress.end();
+  return {};
+}
+
+Expected<void> GatherIntegrator::warmUp(Progress& progress) {
+  const std::size_t count = map_.size();
+  std::vector<CacheLink> links(count * GatherWave::kWarmRays);
+  std::vector<Vec3> direct(count);
+  std::vector<Vec3> seen(count);
+  std::vector<Vec3> relit(count);
+  auto traced = forEachWave(progress, [&](std::size_t w) {
+    const Wave& wave = waves_[w];
+    const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
+    GatheredWave counts;
+    GatherWave texels(scene_, wave.page, wave.first, wave.count);
+    const auto warm = texels.warmUp(
+        std::span(links).subspan(start * GatherWave::kWarmRays, std::size_t{wave.count} * GatherWave::kWarmRays),
+        counts);
+    for (std::size_t i = 0; i < wave.count; ++i) {
+      reflectance_[start + i] = warm[i].reflectance;
+      direct[start + i] = warm[i].direct;
+      seen[start + i] = warm[i].seen;
+      relit[start + i] = warm[i].relit;
+      backFaces_[start + i] = warm[i].backFaces;
+    }
+    return counts;
+  });
+  if (!traced) return traced;
+  substituteInvalid(GatherWave::kWarmRays);
+  solveLinks(links, direct, seen, relit);
+  std::fill(backFaces_.begin(), backFaces_.end(), 0u);
+  return {};
+}
+
+void GatherIntegrator::solveLinks(std::span<const CacheLink> links, std::span<const Vec3> direct,
+                                  std::span<const Vec3> seen, std::span<const Vec3> relit) {
+  const CacheLevels& levels = scene_.levels;
+  const std::size_t count = map_.size();
+  std::vector<Vec3> light(count);  // irradiance / pi
+  std::vector<Vec3> next(count);
+  const auto substitute = [&](std::vector<Vec3>& values) {
+    for (const TexelMap::Substitute& s : substitutes_) values[s.texel] = values[s.source];
+  };
+  const auto keep = [&](int level) {
+    for (std::size_t t = 0; t < count; ++t)
+      cache_[t * stored() + static_cast<std::size_t>(level)] = reflectance_[t] * light[t];
+  };
+  for (std::size_t t = 0; t < count; ++t) light[t] = direct[t] + seen[t];
+  substitute(light);
+  if (levels.base == 0) keep(0);
+  const int sweeps = levels.endless ? kMostSweeps : levels.base + levels.count - 1;
+  double before = 0.0;
+  for (int sweep = 1; sweep <= sweeps; ++sweep) {
+    std::vector<double> parts((count + kSweepGrain - 1) / kSweepGrain);
+    parallelFor(count, kSweepGrain, [&](std::size_t first, std::size_t last) {
+      double sum = 0.0;
+      for (std::size_t t = first; t < last; ++t) {
+        Vec3 found(0.0f);
+        for (const CacheLink& link : links.subspan(t * GatherWave::kWarmRays, GatherWave::kWarmRays))
+          if (link.texel != kNoTexel) found += unpackWeight(link.weight) * reflectance_[link.texel] * light[link.texel];
+        next[t] = direct[t] + seen[t] + relit[t] + found / static_cast<float>(GatherWave::kWarmRays);
+        sum += static_cast<double>(luminance(next[t]));
+      }
+      parts[first / kSweepGrain] = sum;
+    });
+    std::swap(light, next);
+    substitute(light);
+    if (!levels.endless && sweep >= levels.base) keep(sweep - levels.base);
+    double total = 0.0;
+    for (const double part : parts) total += part;
+    if (levels.endless && total - before <= kSettled * total) break;
+    before = total;
+  }
+  if (levels.endless) keep(0);
+}
+
+Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Progress& progress) {
+  auto traced = forEachWave(progress, [&](std::size_t w) {
+    const Wave& wave = waves_[w];
+    GatherWave texels(scene_, wave.page, wave.first, wave.count);
+    GatheredWave done = texels.gather(first, end, cache_);
+    for (std::size_t i = 0; i < wave.count; ++i)
+      coverage_[map_.firstOfPage(wave.page) + wave.first + i] = texels.coverage(i);
+    store(wave, done);
+    progress.advance(std::uint64_t{wave.count} * (end - first));
+    return done;
+  });
+  if (!traced) return traced;
+  samples_ = end;
+  measureSpread(first, end);
+  if (scene_.levels.count > 0 && end < static_cast<std::uint32_t>(options_.samples)) renewCache();
+  return {};
+}
+
+void GatherIntegrator::store(const Wave& wave, const GatheredWave& done) {
+  const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
+  for (std::size_t i = 0; i < wave.count; ++i) {
+    const GatheredTexel& texel = done.texels[i];
+    Sums& sums = sums_[start + i];
+    sums.before = luminance(sums.flat);
+    sums.flat += Vec3(texel.flat);
+    for (std::size_t k = 0; k < 3; ++k) sums.rnm[k] += Vec3(texel.rnm[k]);
+    if (!scene_.levels.endless)
+      for (std::size_t l = 0; l < stored(); ++l) levelSums_[(start + i) * stored() + l] += Vec3(texel.levels[l]);
+    backFaces_[start + i] += texel.backFaces;
+    if ((wave.first + i) % PathIntegrator::kProbeStride == 0)
+      for (std::size_t k = 0; k < kProbeNormals; ++k)
+        probes_[probeOf(wave.page, wave.first + i)][k] += Vec3(texel.probes[k]);
+  }
+}
+
+void GatherIntegrator::substituteInvalid(std::uint32_t rays) {
+  std::vector<std::uint8_t> valid(map_.size());
+  for (std::size_t t = 0; t < valid.size(); ++t) valid[t] = 2 * backFaces_[t] <= rays ? 1 : 0;
+  substitutes_ = map_.substitutes(valid);
+}
+
+Vec3 GatherIntegrator::lightOf(std::size_t texel, std::size_t level) const {
+  const Vec3& sum = scene_.levels.endless ? sums_[texel].flat : levelSums_[texel * stored() + level];
+  return sum / static_cast<float>(samples_);
+}
+
+void GatherIntegrator::renewCache() {
+  substituteInvalid(samples_);
+  // The lowest level stays as the warm-up left it where it stands on others that are not kept.
+  const std::size_t firstLevel = scene_.levels.base > 0 ? 1 : 0;
+  parallelFor(map_.size(), kSweepGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t t = first; t < last; ++t)
+      for (std::size_t l = firstLevel; l < stored(); ++l) cache_[t * stored() + l] = reflectance_[t] * lightOf(t, l);
+  });
+  for (const TexelMap::Substitute& s : substitutes_)
+    for (std::size_t l = firstLevel; l < stored(); ++l)
+      cache_[s.texel * stored() + l] = reflectance_[s.texel] * lightOf(s.source, l);
+}
+
+/// Half the difference between the means of the samples before a pass and those of the pass.
+void GatherIntegrator::measureSpread(std::uint32_t first, std::uint32_t end) {
+  if (first == 0) return;
+  const auto n0 = static_cast<float>(first);
+  const auto n1 = static_cast<float>(end - first);
+  double sum = 0.0;
+  for (std::size_t t = 0; t < sums_.size(); ++t) {
+    const float difference = sums_[t].before / n0 - (luminance(sums_[t].flat) - sums_[t].before) / n1;
+    sum += static_cast<double>(difference * difference);
+  }
+  if (end == 2 * first) spreads_.push_back(sum / 4.0);
+}
+
+void GatherIntegrator::estimateErrors() {
+  standardErrors_.assign(map_.size(), 0.0f);
+  if (samples_ < 2 * kFirstPass) return;
+  std::uint32_t first = kFirstPass;
+  while (2 * first < samples_) first *= 2;
+  const double n0 = first;
+  const double n1 = samples_ - first;
+  double rate = 1.0;
+  if (spreads_.size() >= 2 && spreads_.back() > 0.0)
+    rate = std::clamp(std::log2(spreads_[spreads_.size() - 2] / spreads_.back()), 1.0, 2.0);
+  const double scale = n0 * n1 / ((n0 + n1) * (n0 + n1)) / (std::exp2(rate) - 1.0);
+  parallelFor(waves_.size(), 256, [&](std::size_t firstWave, std::size_t lastWave) {
+    for (std::size_t w = firstWave; w < lastWave; ++w) {
+      const std::size_t start = map_.firstOfPage(waves_[w].page) + waves_[w].first;
+      double sum = 0.0;
+      for (std::size_t t = start; t < start + waves_[w].count; ++t) {
+        const double before = static_cast<double>(sums_[t].before);
+        const double difference = before / n0 - (static_cast<double>(luminance(sums_[t].flat)) - before) / n1;
+        sum += difference * difference;
+      }
+      const auto error = static_cast<float>(std::sqrt(scale * sum / waves_[w].count));
+      std::fill_n(standardErrors_.begin() + static_cast<std::ptrdiff_t>(start), waves_[w].count, error);
+    }
+  });
+}
+
+BakedTexel GatherIntegrator::texel(std::uint32_t page, std::size_t index) const {
+  const std::size_t t = map_.firstOfPage(page) + index;
+  const float scale = 1.0f / static_cast<float>(samples_);
+  BakedTexel baked;
+  baked.value.flat = sums_[t].flat * scale;
+  for (std::size_t k = 0; k < 3; ++k) baked.value.rnm[k] = sums_[t].rnm[k] * scale;
+  baked.coverage = coverage_[t];
+  baked.validity = 1.0f - static_cast<float>(backFaces_[t]) * scale;
+  baked.standardError = standardErrors_[t];
+  baked.samples = coverage_[t] > 0.0f ? samples_ : 0;
+  baked.probed = index % PathIntegrator::kProbeStride == 0;
+  if (baked.probed)
+    for (std::size_t k = 0; k < kProbeNormals; ++k) baked.probes[k] = probes_[probeOf(page, index)][k] * scale;
+  return baked;
+}
+
+}  // namespace lumel

@@ -1,0 +1,113 @@
+// Progressive final gather: texels gather the light that other texels are already known to reflect, instead of
+// following every path to its end (Ward and Heckbert 1992, "Irradiance Gradients", keep such a cache at points chosen
+// on the way; here the lightmap's texels are the points). Method, bias and figures: baker/README.md.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "baker/gather_wave.h"
+#include "scene/expected.h"
+#include "scene/progress.h"
+
+namespace lumel {
+
+struct GatherOptions {
+  int samples = 1;
+  int bounces = -1;  // indirect bounces; negative: all that matter
+  std::uint64_t seed = 1;
+};
+
+/// A texel as it is stored, before finishTexel.
+struct BakedTexel {
+  SampleValue value;  // means
+  float coverage = 0.0f;
+  float validity = 1.0f;
+  float standardError = 0.0f;
+  std::uint32_t samples = 0;
+  bool probed = false;
+  std::array<Vec3, kProbeNormals> probes{};  // light on probeNormals(), where probed
+};
+
+/// The light of all texels of an atlas. Every pass reads the cache that the passes before it left, and the cache is
+/// renewed between passes: results do not depend on the number of threads.
+///
+/// 1. A direct map: kWarmLights light samples per texel.
+/// 2. Warm-up: kWarmRays rays per texel are traced once and kept as links to the texels that they hit; the light of
+///    one bounce after another is passed along them, without further rays.
+/// 3. Gather: passes of 8, 8, 16, 32, ... samples per texel that continue one sequence. After each the cache is what
+///    all of them found so far.
+///
+/// With a given number of bounces N the cache holds levels, the light after 0, 1, ... N - 1 bounces, and one ray
+/// serves all of them: level k of a texel adds what level k - 1 of the texel that it hit reflects, so the result has
+/// exactly N bounces. Of more than CacheLevels::kMost levels the highest are kept, and the lowest of these stays as the
+/// warm-up left it.
+class GatherIntegrator {
+ public:
+  /// Keeps references to its arguments.
+  GatherIntegrator(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
+                   const std::vector<PageTexels>& texels, const GatherOptions& options);
+
+  /// Errors: Interrupted.
+  Expected<void> run(Progress& progress);
+
+  BakedTexel texel(std::uint32_t page, std::size_t index) const;
+
+  std::uint64_t rays() const { return rays_; }
+  std::uint64_t shadowRays() const { return shadowRays_; }
+  const std::vector<NonFiniteSample>& nonFinite() const { return nonFinite_; }
+
+ private:
+  struct Wave {
+    std::uint32_t page = 0;
+    std::uint32_t first = 0;  // texel of the page
+    std::uint32_t count = 0;
+  };
+  /// Sums over all samples so far.
+  struct Sums {
+    Vec3 flat{0};
+    std::array<Vec3, 3> rnm{Vec3(0), Vec3(0), Vec3(0)};
+    float before = 0.0f;  // luminance of `flat` before the last pass
+  };
+
+  Expected<void> warmUp(Progress& progress);
+  void solveLinks(std::span<const CacheLink> links, std::span<const Vec3> direct, std::span<const Vec3> seen,
+                  std::span<const Vec3> relit);
+  Expected<void> pass(std::uint32_t first, std::uint32_t end, Progress& progress);
+  void store(const Wave& wave, const GatheredWave& done);
+  void renewCache();
+  void substituteInvalid(std::uint32_t rays);
+  /// Irradiance / pi as of level `level`, from all samples so far.
+  Vec3 lightOf(std::size_t texel, std::size_t level) const;
+  std::size_t probeOf(std::uint32_t page, std::size_t index) const {
+    return firstProbe_[page] + index / PathIntegrator::kProbeStride;
+  }
+  void measureSpread(std::uint32_t first, std::uint32_t end);
+  void estimateErrors();
+  template <class Body>
+  Expected<void> forEachWave(Progress& progress, Body body);
+  std::size_t stored() const { return static_cast<std::size_t>(scene_.levels.count); }
+
+  const GatherOptions options_;
+  TexelMap map_;
+  GatherScene scene_;
+  std::vector<Wave> waves_;
+  std::vector<Sums> sums_;
+  std::vector<Vec3> levelSums_;  // levels.count per texel, unless endless
+  std::vector<Vec3> reflectance_;
+  std::vector<Vec3> cache_;  // levels.count per texel
+  std::vector<float> coverage_;
+  std::vector<std::uint32_t> backFaces_;
+  std::vector<std::array<Vec3, kProbeNormals>> probes_;
+  std::vector<std::size_t> firstProbe_;  // per page
+  std::vector<float> standardErrors_;
+  std::vector<double> spreads_;  // per pass that doubled the samples: mean square of half the halves' difference
+  std::vector<TexelMap::Substitute> substitutes_;
+  std::uint32_t samples_ = 0;
+  std::uint64_t rays_ = 0;
+  std::uint64_t shadowRays_ = 0;
+  std::vector<NonFiniteSample> nonFinite_;
+};
+
+}  // namespace lumel

@@ -1,0 +1,175 @@
+// Rays that end on the texel cache: a ray stops at the first surface whose texel knows what it reflects. Where a hit
+// has no texel (a surface without lightmap, the back of a single-sided one) it is shaded on the spot: its direct light
+// is sampled and one ray goes on, until it meets a texel.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "baker/direct_light.h"
+#include "baker/light_transport.h"
+#include "baker/sampling.h"
+#include "baker/texel_cache.h"
+
+namespace lumel {
+
+/// A ray on its way, and the gather ray that it belongs to.
+struct Flight {
+  std::uint32_t lane = 0;  // the texel of the wave that gathers
+  std::uint32_t sample = 0;
+  std::uint32_t key = 0;   // of the texel: seeds the choices made at hits
+  int depth = 0;           // hits between the texel and this ray's start
+  Vec3 dirTangent{0};      // of the gather ray
+  Vec3 beta{0};            // weight of the radiance that this ray finds
+  Vec3 origin{0};          // the surface point, before its offset
+  float pdf = 0.0f;        // with which this ray's direction would be gathered, for the weight against light samples
+};
+
+/// Sink receives what rays find, in an order that depends on the rays alone:
+///   light(flight, radiance, depth)   radiance that exists for bakes of `depth` indirect bounces and more
+///   texel(flight, texel)             the flight ended on this texel
+///   backFace(flight)                 a gather ray met the back of a single-sided surface
+template <class Sink>
+class GatherTracer {
+ public:
+  /// Hits at depth `lastDepth` bring their own emission alone.
+  GatherTracer(const LightTransport& transport, const TexelMap& map, int lastDepth, Sink& sink)
+      : transport_(transport), map_(map), lastDepth_(lastDepth), sink_(sink) {}
+
+  /// Begins a packet; then set() for its lanes, then trace().
+  void clear() { packet_.clear(); }
+  void set(int lane, const Flight& flight, const Vec3& rayStart, const Vec3& dirWorld) {
+    flights_[static_cast<std::size_t>(lane)] = flight;
+    packet_.set(lane, rayStart, dirWorld);
+    ++rays_;
+  }
+  void trace(TraceMode mode) {
+    transport_.rays.intersect(packet_, mode);
+    for (int lane = 0; lane < kLanes; ++lane)
+      if (packet_.valid[lane]) arrive(lane);
+  }
+
+  /// Follows what was left to be shaded on the spot, in full packets.
+  void finish() {
+    while (!spots_.empty()) {
+      const std::size_t count = std::min<std::size_t>(kLanes, spots_.size());
+      shade(std::span(spots_).last(count), count);
+    }
+  }
+
+  std::uint64_t rays() const { return rays_; }
+  std::uint64_t shadowRays() const { return shadowRays_; }
+
+ private:
+  struct Spot {
+    Flight flight;  // beta includes the albedo
+    Receiver receiver;
+  };
+  static constexpr int kRouletteAfter = 4;
+  static constexpr std::uint32_t kDirection = kLightPatterns;
+  static constexpr std::uint32_t kRoulette = kLightPatterns + 1;
+
+  static TexelSampler samplerAt(const Flight& flight) {
+    return {flight.key, flight.sample, static_cast<std::uint32_t>(flight.depth), 0u};
+  }
+
+  void arrive(int lane) {
+    Flight& flight = flights_[static_cast<std::size_t>(lane)];
+    if (!packet_.hit(lane)) {
+      if (!transport_.environment.shines()) return;
+      const Vec3 dir = directionOf(lane);
+      sink_.light(flight,
+                  transport_.environment.radiance(dir) * misWeight(flight.pdf, transport_.environment.pdf(dir)),
+                  flight.depth);
+      return;
+    }
+    const std::uint32_t part = transport_.rays.partOf(packet_, lane);
+    const bool emits = transport_.rays.parts()[part].firstEmitter >= 0;
+    const std::uint32_t texel = flight.depth < lastDepth_ ? texelAt(part, lane) : kNoTexel;
+    if (!emits && texel != kNoTexel) {
+      sink_.texel(flight, texel);
+      return;
+    }
+    const HitSurface hit = transport_.rays.surfaceAt(packet_, lane);
+    if (flight.depth == 0 && hit.backFace && !transport_.materials.material(hit.material).doubleSided)
+      sink_.backFace(flight);
+    if (emits) {
+      const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
+      if (emitted != Vec3(0.0f))
+        sink_.light(flight, emitted * misWeight(flight.pdf, transport_.emissive.pdf(hit, flight.origin)), flight.depth);
+    }
+    if (texel != kNoTexel)
+      sink_.texel(flight, texel);
+    else if (flight.depth < lastDepth_)
+      leaveToShade(flight, hit);
+  }
+
+  std::uint32_t texelAt(std::uint32_t part, int lane) const {
+    const RTCHit16& hit = packet_.rayhit.hit;
+    return map_.find(part, hit.primID[lane], {hit.u[lane], hit.v[lane]}, directionOf(lane));
+  }
+
+  Vec3 directionOf(int lane) const {
+    const RTCRay16& ray = packet_.rayhit.ray;
+    return {ray.dir_x[lane], ray.dir_y[lane], ray.dir_z[lane]};
+  }
+
+  void leaveToShade(const Flight& flight, const HitSurface& hit) {
+    Spot spot{flight, {hit.p, hit.ng, hit.ns, hit.rayStart}};
+    const Vec3 albedo = transport_.materials.albedo(hit.point);
+    const float most = std::max({albedo.x, albedo.y, albedo.z});
+    if (most == 0.0f) return;
+    spot.flight.beta *= albedo;
+    if (flight.depth >= kRouletteAfter) {
+      const float survival = std::max(most, 0.05f);
+      if (samplerAt(flight).get1D(0, kRoulette) >= survival) return;
+      spot.flight.beta /= survival;
+    }
+    spots_.push_back(spot);
+  }
+
+  void shade(std::span<const Spot> chosen, std::size_t count) {
+    LightLanes lanes;
+    std::array<Spot, kLanes> spots;
+    std::copy(chosen.begin(), chosen.end(), spots.begin());
+    spots_.resize(spots_.size() - count);
+    for (std::size_t lane = 0; lane < count; ++lane) {
+      lanes.active[lane] = true;
+      lanes.receivers[lane] = spots[lane].receiver;
+      lanes.samplers[lane] = samplerAt(spots[lane].flight);
+    }
+    shadowRays_ += directLight(
+        transport_, lanes, 0, 0, TraceMode::Packet, [](float cosTheta) { return cosineHemispherePdf(cosTheta); },
+        [&](int lane, const Vec3& wi, const Vec3& light) {
+          const Spot& spot = spots[static_cast<std::size_t>(lane)];
+          sink_.light(spot.flight, light * (glm::dot(wi, spot.receiver.ns) * kInvPi), spot.flight.depth + 1);
+        });
+    clear();
+    for (std::size_t lane = 0; lane < count; ++lane) {
+      const Receiver& receiver = spots[lane].receiver;
+      const Vec3 local = sampleCosineHemisphere(lanes.samplers[lane].get2D(0, kDirection));
+      const Vec3 dirWorld = frameAround(receiver.ns).fromLocal(local);
+      if (!(glm::dot(dirWorld, receiver.ng) > 0.0f)) continue;
+      Flight next = spots[lane].flight;
+      ++next.depth;
+      next.origin = receiver.p;
+      next.pdf = cosineHemispherePdf(local.z);
+      set(static_cast<int>(lane), next, receiver.rayStart, dirWorld);
+    }
+    trace(TraceMode::Packet);
+  }
+
+  const LightTransport& transport_;
+  const TexelMap& map_;
+  const int lastDepth_;
+  Sink& sink_;
+  RayPacket packet_;
+  std::array<Flight, kLanes> flights_;
+  std::vector<Spot> spots_;
+  std::uint64_t rays_ = 0;
+  std::uint64_t shadowRays_ = 0;
+};
+
+}  // namespace lumel

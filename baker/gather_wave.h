@@ -1,0 +1,125 @@
+// One wave of a gather pass: up to 16 neighbouring texels send the rays of one pass in step.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "baker/gather_tracer.h"
+#include "baker/path_integrator.h"
+#include "baker/stratified_net.h"
+#include "lightmap/projection.h"
+
+namespace lumel {
+
+/// The light that the cache holds for every texel, by number of bounces. Level l holds light after base + l bounces;
+/// a bake of N bounces reads N - 1. `endless`: one level, which holds all bounces and is read by itself.
+struct CacheLevels {
+  static constexpr int kMost = 8;
+  int count = 0;  // levels stored; 0: nothing is looked up
+  int base = 0;
+  bool endless = false;
+
+  /// Level that a gather of `bounces` reads after `depth` more hits; -1: none.
+  int read(int bounces, int depth) const {
+    if (endless) return 0;
+    const int level = bounces - 1 - depth - base;
+    // Below the lowest level that is kept the light of a few bounces more stands in.
+    return level >= 0 ? level : (base > 0 ? 0 : -1);
+  }
+};
+
+/// What every wave reads.
+struct GatherScene {
+  const LightTransport& transport;
+  const RnmKernels& kernels;
+  const Atlas& atlas;
+  const std::vector<PageTexels>& texels;
+  const TexelMap& map;
+  std::uint64_t seed = 1;
+  int bounces = 0;    // of the result; with endless levels unused
+  int lastDepth = 0;  // GatherTracer
+  CacheLevels levels{};
+  TraceMode gatherMode = TraceMode::Packet;
+};
+
+/// What the texels of a wave gathered in one pass: sums over its samples.
+struct GatheredTexel {
+  Vec3d flat{0};
+  std::array<Vec3d, 3> rnm{Vec3d(0), Vec3d(0), Vec3d(0)};
+  std::array<Vec3d, CacheLevels::kMost> levels{};  // flat light of the cache's levels, unless endless
+  std::array<Vec3d, kProbeNormals> probes{};       // where the texel is probed
+  std::uint32_t backFaces = 0;
+};
+
+struct GatheredWave {
+  std::array<GatheredTexel, kLanes> texels;
+  std::uint64_t rays = 0;
+  std::uint64_t shadowRays = 0;
+  std::vector<NonFiniteSample> nonFinite;
+};
+
+/// A link of the warm-up: one gather ray that found a texel.
+struct CacheLink {
+  std::uint32_t texel = kNoTexel;
+  std::uint32_t weight = 0;  // packWeight: red, green, blue in steps of 1/1023
+};
+std::uint32_t packWeight(const Vec3& weight);  // 0..1, clamped
+Vec3 unpackWeight(std::uint32_t packed);
+
+/// The start of the cache at one texel.
+struct WarmTexel {
+  Vec3 reflectance{0};  // mean over the texel
+  Vec3 direct{0};       // irradiance / pi from light samples
+  Vec3 seen{0};         // the same from what rays see shine by itself
+  Vec3 relit{0};        // the same from hits without texels: light of one bounce and more
+  std::uint32_t backFaces = 0;
+};
+
+class GatherWave {
+ public:
+  static constexpr int kWarmRays = 8;
+  static constexpr int kWarmLights = 16;
+
+  /// Texels [first, first + count) of a page, count <= kLanes.
+  GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t first, std::size_t count);
+
+  /// Share of the texel's area that is covered, 0..1.
+  float coverage(std::size_t lane) const { return static_cast<float>(std::min(areas_[lane], 1.0)); }
+
+  /// `links`: kWarmRays per texel of the wave.
+  std::array<WarmTexel, kLanes> warmUp(std::span<CacheLink> links, GatheredWave& counts);
+
+  /// Samples [first, end) of every covered texel. `cache`: levels.count values per texel of the map: the radiance
+  /// that the texel reflects.
+  GatheredWave gather(std::uint32_t first, std::uint32_t end, std::span<const Vec3> cache);
+
+ private:
+  struct Point {
+    Receiver receiver;
+    Frame frame;
+  };
+  static constexpr std::uint32_t kMostPoints = 16;
+
+  /// Draws `count` points of every texel, a power of two.
+  void drawPoints(std::uint32_t first, std::uint32_t count);
+  const Point& pointOf(std::size_t lane, std::uint32_t sample) const { return points_[lane][sample & pointMask_]; }
+  Vec3 reflectanceOf(const SurfacePoint& point, float& opacity) const;
+  void gatherNet(const NetRange& net, std::span<const Vec3> cache, GatheredWave& result);
+
+  const GatherScene& scene_;
+  std::uint32_t page_;
+  std::size_t first_;
+  std::size_t count_;
+  std::array<TexelFootprint, kLanes> footprints_;
+  std::array<double, kLanes> areas_{};
+  std::array<TexelSampler, kLanes> samplers_;
+  std::array<std::uint32_t, kLanes> keys_{};
+  std::array<std::array<Point, kMostPoints>, kLanes> points_;
+  std::array<std::array<SurfacePoint, kMostPoints>, kLanes> surfacePoints_;
+  std::uint32_t pointMask_ = 0;
+};
+
+}  // namespace lumel

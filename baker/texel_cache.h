@@ -1,0 +1,66 @@
+// The light that texels send back, for rays that end on them: where in the atlas a hit lies, and what the texel there
+// reflects.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "baker/ray_scene.h"
+#include "lightmap/surface.h"
+#include "lightmap/texels.h"
+
+namespace lumel {
+
+inline constexpr std::uint32_t kNoTexel = 0xffffffffu;
+
+/// Covered texels of all pages are numbered through: page by page, in the order of PageTexels.
+class TexelMap {
+ public:
+  /// Keeps references to `atlas` and `texels`. Memory: 4 bytes per pixel of every page, 48 per triangle of a part that
+  /// has a lightmap.
+  TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<PageTexels>& texels);
+
+  std::size_t size() const { return firstOfPage_.back(); }
+  std::uint32_t firstOfPage(std::size_t page) const { return firstOfPage_[page]; }
+  std::size_t pageOf(std::uint32_t texel) const;
+
+  /// The texel that holds the light of a point of a triangle of RayScene::parts()[part], or kNoTexel: the part has no
+  /// lightmap, `dirWorld` travels towards its back, or the point lies (by rounding) beside all texels of the page.
+  std::uint32_t find(std::uint32_t part, std::uint32_t triangle, Vec2 barycentric, const Vec3& dirWorld) const;
+
+  /// For each texel that is not `valid`: the nearest valid one of the same chart, within kReach texels; pairs of
+  /// (texel, source) in the order of texels. Texels without such a neighbour are left out.
+  struct Substitute {
+    std::uint32_t texel = 0;
+    std::uint32_t source = 0;
+  };
+  std::vector<Substitute> substitutes(std::span<const std::uint8_t> valid) const;
+  static constexpr int kReach = 16;
+
+ private:
+  struct Triangle {
+    Vec2 pixels[3]{};      // of the source triangle's corners on the page
+    Vec3 frontNormal{0};   // world
+    std::uint32_t page = kNoTexel;  // kNoTexel: no lightmap
+  };
+  struct PageMap {
+    int width = 0;
+    int height = 0;
+    std::size_t first = 0;  // into pixels_
+  };
+  void addSurface(const RayScene& rays, std::uint32_t part, const Surface& surface);
+  std::uint32_t at(const PageMap& page, int x, int y) const;
+  std::uint32_t chartOf(const PageTexels& page, std::size_t texel) const;
+  std::uint32_t nearestValid(std::size_t page, std::size_t texel, std::span<const std::uint8_t> valid) const;
+
+  const Atlas& atlas_;
+  const std::vector<PageTexels>& texels_;
+  std::vector<std::uint32_t> firstOfPage_;  // [pages + 1]
+  std::vector<PageMap> pages_;
+  std::vector<std::uint32_t> pixels_;       // per pixel of every page: its texel or kNoTexel
+  std::vector<std::int64_t> firstOfPart_;   // per part: into triangles_; -1: no lightmap
+  std::vector<Triangle> triangles_;
+};
+
+}  // namespace lumel

@@ -1,0 +1,284 @@
+// The final gather against closed forms and against path tracing, and what is particular to its cache: levels of
+// bounces, surfaces without texels, texels inside of things.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+
+#include "baker/stratified_net.h"
+#include "tests/baker/test_scene.h"
+
+namespace lumel {
+namespace {
+
+using namespace testing_scene;
+
+double meanOf(const BakedPage& page) {
+  double sum = 0;
+  for (int y = 0; y < page.flat.height; ++y)
+    for (int x = 0; x < page.flat.width; ++x) sum += static_cast<double>(luminance(page.flat.rgb(x, y)));
+  return sum / (page.flat.width * page.flat.height);
+}
+
+double meanOf(const BakeResult& result) {
+  double sum = 0;
+  for (const BakedPage& page : result.pages) sum += meanOf(page) / static_cast<double>(result.pages.size());
+  return sum;
+}
+
+TEST(StratifiedNet, OnePointInEveryCell) {
+  const TexelSampler sampler(7, 1, 2, 3);
+  for (int log2Count = 0; log2Count <= 8; ++log2Count)
+    for (const std::uint32_t block : {0u, 1u, 5u}) {
+      NetByCell net;
+      net.samples.fill(std::numeric_limits<std::uint32_t>::max());
+      const NetRange range{block << log2Count, log2Count};
+      net.fill(sampler, range, 4);
+      for (std::uint32_t cell = 0; cell < range.count(); ++cell) {
+        ASSERT_GE(net.samples[cell], range.first);
+        ASSERT_LT(net.samples[cell], range.first + range.count()) << "cell " << cell << " of " << range.count();
+        EXPECT_EQ(net.points[cell], sampler.get2D(net.samples[cell], 4));
+      }
+    }
+}
+
+TEST(StratifiedNet, CoversAnyRange) {
+  std::uint32_t next = 3;
+  while (next < 1001) {
+    const NetRange net = netAt(next, 1001);
+    EXPECT_EQ(net.first, next);
+    EXPECT_EQ(net.first % net.count(), 0u);
+    EXPECT_LE(net.count(), static_cast<std::uint32_t>(kMostNetPoints));
+    next += net.count();
+  }
+  EXPECT_EQ(next, 1001u);
+}
+
+TestScene furnace(float albedo, int texels) {
+  TestScene test;
+  test.integrator = Integrator::Gather;
+  test.addRoom({0, 0, 0}, {1, 1, 1}, {.material = test.addMaterial(Vec3(albedo), Vec3(1.0f)), .texels = texels});
+  return test;
+}
+
+// In a closed box whose walls emit 1 and reflect a, N bounces bring sum a^k, k = 0..N. Twelve bounces are more than
+// the cache has levels.
+TEST(Gather, FurnaceHasExactlyTheBouncesAskedFor) {
+  for (const float albedo : {0.5f, 0.8f})
+    for (const int bounces : {0, 1, 2, 4, 8, 12, 30}) {
+      double expected = 0;
+      for (int k = 0; k <= bounces; ++k) expected += std::pow(static_cast<double>(albedo), k);
+      const BakeResult result = furnace(albedo, 16).bake({.samples = 64, .bounces = bounces});
+      // Seeds differ by 0.1% at albedo 0.8, where all share the noise of the cache.
+      EXPECT_NEAR(meanOf(result) / expected, 1.0, 4e-3) << "albedo " << albedo << ", " << bounces << " bounces";
+      for (const BakedPage& page : result.pages)
+        for (const float v : page.flat.pixels) ASSERT_NEAR(v / expected, 1.0, 0.08);
+    }
+}
+
+TEST(Gather, FurnaceOfAllBounces) {
+  for (const float albedo : {0.0f, 0.2f, 0.5f, 0.8f, 0.95f}) {
+    const BakeResult result = furnace(albedo, 16).bake({.samples = 64});
+    // The warm-up ends where a bounce adds less than 1e-4 of the whole: what is missing is below a / (1 - a) of that,
+    // and each pass adds more of it.
+    // Noise that all texels share is passed on like light: 0.02% / (1 - a) from seed to seed.
+    EXPECT_NEAR(meanOf(result) * (1 - static_cast<double>(albedo)), 1.0, 2e-3 + 8e-4 / (1 - static_cast<double>(albedo))) << "albedo " << albedo;
+  }
+}
+
+// A room that sends back all light has no finite answer; the bake must end with a finite one.
+TEST(Gather, WhiteFurnaceEnds) {
+  const BakeResult result = furnace(1.0f, 4).bake({.samples = 64});
+  EXPECT_TRUE(std::isfinite(meanOf(result)));
+  EXPECT_GT(meanOf(result), 50.0);
+}
+
+// Light by reflection alone: flux / area * sum a^k.
+TEST(Gather, PointLightEnergyBalance) {
+  TestScene test;
+  test.integrator = Integrator::Gather;
+  test.addRoom({-1, -1, -1}, {1, 1, 1}, {.material = test.addMaterial(Vec3(0.6f)), .texels = 8});
+  Light light;
+  light.intensity = 2.0f;
+  test.scene.lights = {light};
+  const double direct = 4 * std::numbers::pi * 2 / 24 / std::numbers::pi;
+  for (const int bounces : {0, 1, 3, kAllBounces}) {
+    double series = 0;
+    for (int k = 0; k <= (bounces < 0 ? 100 : bounces); ++k) series += std::pow(0.6, k);
+    EXPECT_NEAR(meanOf(test.bake({.samples = 128, .bounces = bounces})) / (direct * series), 1.0, 3e-3) << bounces;
+  }
+}
+
+/// Mean of a map over the texels that lie outside of things.
+double meanOfValid(const Image& map, const Image& aux) {
+  double sum = 0, count = 1e-9;
+  for (int y = 0; y < map.height; ++y)
+    for (int x = 0; x < map.width; ++x)
+      if (aux.at(x, y)[1] > 0.5f) {
+        sum += static_cast<double>(luminance(map.rgb(x, y)));
+        ++count;
+      }
+  return sum / count;
+}
+
+/// Both integrators on a scene: the means of every page, to `tolerance` of them and to 0.3% of the brightest page,
+/// which is the noise of a path traced page that light reaches by several bounces alone.
+void expectAgreementWithPath(TestScene test, int bounces, double tolerance, int samples, int pathSamples) {
+  test.integrator = Integrator::Path;
+  const BakeResult path = test.bake({.samples = pathSamples, .bounces = bounces, .projection = Projection::Raw});
+  test.integrator = Integrator::Gather;
+  const BakeResult gather = test.bake({.samples = samples, .bounces = bounces, .projection = Projection::Raw});
+  ASSERT_EQ(path.pages.size(), gather.pages.size());
+  double brightest = 0;
+  for (const BakedPage& page : path.pages) brightest = std::max(brightest, meanOf(page));
+  ASSERT_GT(brightest, 0.0);
+  for (std::size_t p = 0; p < path.pages.size(); ++p)
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto mean = [&](const BakedPage& page) {
+        return meanOfValid(i == 0 ? page.flat : page.rnm[i - 1], path.pages[p].aux);
+      };
+      const double expected = mean(path.pages[p]);
+      EXPECT_NEAR(mean(gather.pages[p]), expected, tolerance * expected + 3e-3 * brightest)
+          << "page " << p << ", map " << i << ", " << bounces << " bounces";
+    }
+}
+
+// Every kind of light, a cut-out, instances without texels, backs of single-sided walls; light crosses pages.
+// The tolerance is the noise of the path tracer (0.5%) and the cache's stated bias (0.5%).
+TEST(Gather, AgreesWithPathTracing) {
+  for (const int bounces : {1, 3, kAllBounces}) expectAgreementWithPath(busyRoom(), bounces, 0.01, 256, 2048);
+}
+
+/// Two rooms side by side, the left one lit by a lamp, joined by a door in a thick wall. Walls stand on the borders of
+/// the floor's texels, so that no texel lies in both rooms.
+TestScene twoRooms() {
+  TestScene test;
+  const int wall = test.addMaterial({0.7f, 0.6f, 0.5f});
+  const int lamp = test.addMaterial(Vec3(0.0f), Vec3(10.0f));
+  const RectangleOptions big{.material = wall, .texels = 16};
+  test.addRectangle({-4, 0, 4}, {8, 0, 0}, {0, 0, -4}, big);  // floor
+  test.addRectangle({-4, 3, 0}, {8, 0, 0}, {0, 0, 4}, big);   // ceiling
+  test.addRectangle({-4, 0, 0}, {8, 0, 0}, {0, 3, 0}, big);   // back
+  test.addRectangle({4, 0, 4}, {-8, 0, 0}, {0, 3, 0}, big);   // front
+  test.addRectangle({-4, 0, 4}, {0, 0, -4}, {0, 3, 0}, big);  // left
+  test.addRectangle({4, 0, 0}, {0, 0, 4}, {0, 3, 0}, big);    // right
+  const RectangleOptions small{.material = wall, .texels = 8};
+  for (const float z : {0.0f, 2.5f}) {  // the wall leaves z from 1.5 to 2.5 open
+    test.addRectangle({-0.5f, 0, z}, {0, 0, 1.5f}, {0, 3, 0}, small);  // faces -x
+    test.addRectangle({0.5f, 0, z + 1.5f}, {0, 0, -1.5f}, {0, 3, 0}, small);
+  }
+  test.addRectangle({-0.5f, 0, 1.5f}, {1, 0, 0}, {0, 3, 0}, small);
+  test.addRectangle({0.5f, 0, 2.5f}, {-1, 0, 0}, {0, 3, 0}, small);
+  test.addRectangle({-3, 2.9f, 1}, {1, 0, 0}, {0, 0, 1}, {.material = lamp, .texels = 0});
+  return test;
+}
+
+TEST(Gather, AgreesWithPathTracingThroughADoor) {
+  for (const int bounces : {2, kAllBounces}) expectAgreementWithPath(twoRooms(), bounces, 0.02, 128, 1024);
+}
+
+// Nothing but the floor has texels: every hit is shaded on the spot, and the bounces asked for are counted exactly.
+TEST(Gather, SurfacesWithoutTexels) {
+  for (const int bounces : {0, 1, 2, 5}) {
+    TestScene test;
+    test.integrator = Integrator::Gather;
+    const int material = test.addMaterial(Vec3(0.5f), Vec3(1.0f));
+    test.addRoom({0, 0, 0}, {1, 1, 1}, {.material = material, .texels = 0});
+    const int page = test.addRectangle({0.2f, 0.01f, 0.8f}, {0.6f, 0, 0}, {0, 0, -0.6f},
+                                       {.material = material, .casts = false});
+    double expected = 0;
+    for (int k = 0; k <= bounces; ++k) expected += std::pow(0.5, k);
+    const double tilted = (1 + 1 / std::sqrt(3.0)) / 2 * expected;
+    expectAgreement(deviation(test, {.samples = 256, .bounces = bounces}, page,
+                              [&](const Vec3d&) { return Maps{expected, tilted, tilted, tilted}; }));
+  }
+}
+
+bool sameBytes(const Image& a, const Image& b) {
+  return a.pixels.size() == b.pixels.size() &&
+         std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(float)) == 0;
+}
+
+bool sameBytes(const BakeResult& a, const BakeResult& b) {
+  for (std::size_t p = 0; p < a.pages.size(); ++p) {
+    for (std::size_t i = 0; i < 3; ++i)
+      if (!sameBytes(a.pages[p].rnm[i], b.pages[p].rnm[i])) return false;
+    if (!sameBytes(a.pages[p].flat, b.pages[p].flat) || !sameBytes(a.pages[p].aux, b.pages[p].aux)) return false;
+  }
+  return a.stats.rays == b.stats.rays && a.stats.shadowRays == b.stats.shadowRays;
+}
+
+TEST(Gather, SameBytesForAnyThreadCount) {
+  TestScene test = busyRoom();
+  test.integrator = Integrator::Gather;
+  for (const int bounces : {3, kAllBounces}) {
+    const BakeOptions options{.samples = 48, .bounces = bounces};
+    const BakeResult one = test.bake(options, 1);
+    EXPECT_GT(one.stats.meanFlat, 0.1);
+    EXPECT_TRUE(sameBytes(one, test.bake(options, 2)));
+    EXPECT_TRUE(sameBytes(one, test.bake(options, 4)));
+  }
+}
+
+// A closed room under a sky and a sun that no ray may find.
+TEST(Gather, ClosedRoomsStayBlack) {
+  TestScene test;
+  test.integrator = Integrator::Gather;
+  test.addRoom(Vec3(0.1f), Vec3(3.1f), {.material = test.addMaterial(Vec3(0.8f)), .texels = 16});
+  test.scene.environment.image = Image(8, 4, 3, 1e6f);
+  Light sun;
+  sun.type = LightType::Directional;
+  sun.direction = glm::normalize(Vec3(1, -2, 0.5f));
+  sun.intensity = 1e6f;
+  test.scene.lights = {sun};
+  EXPECT_EQ(meanOf(test.bake({.samples = 64})), 0.0);
+}
+
+TEST(Gather, AuxChannelsAndAnySampleCount) {
+  TestScene test;
+  test.integrator = Integrator::Gather;
+  const int inside = test.addRectangle({-1, 0, 1}, {2, 0, 0}, {0, 0, -2});
+  // A lid that turns its back to the rectangle, single-sided: most gather rays meet a back face.
+  test.addRectangle({-50, 0.5f, 50}, {100, 0, 0}, {0, 0, -100}, {.texels = 2});
+  test.scene.environment.color = Vec3(1.0f);
+  for (const int samples : {1, 2, 3, 17, 100}) {
+    const BakeResult result = test.bake({.samples = samples, .bounces = 1});
+    const float* aux = result.pages[static_cast<std::size_t>(inside)].aux.at(1, 1);
+    EXPECT_FLOAT_EQ(aux[0], 1.0f);
+    if (samples == 100) {
+      EXPECT_LT(aux[1], 0.1f);
+    }
+    EXPECT_EQ(aux[3], static_cast<float>(samples));
+    EXPECT_EQ(result.pages[1].aux.at(0, 0)[1], 1.0f);
+  }
+}
+
+TEST(Gather, NonFiniteSamplesAreNamed) {
+  TestScene test;
+  test.integrator = Integrator::Gather;
+  test.addRectangle({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, {.texels = 2});
+  const int lamp = test.addMaterial(Vec3(0.0f), Vec3(std::numeric_limits<float>::infinity()));
+  test.addRectangle({-1, 1, -1}, {2, 0, 0}, {0, 0, 2}, {.material = lamp, .texels = 0});
+  test.scene.environment.color = Vec3(1.0f);
+  const auto result = test.tryBake({.samples = 64, .seed = 5});
+  ASSERT_TRUE(result);
+  EXPECT_GT(result->stats.nonFiniteSamples, 10u);
+  ASSERT_FALSE(result->stats.notes.empty());
+  EXPECT_NE(result->stats.notes[0].find("page 0, texel ("), std::string::npos) << result->stats.notes[0];
+  for (const BakedPage& page : result->pages)
+    for (const float v : page.flat.pixels) EXPECT_TRUE(std::isfinite(v));
+}
+
+TEST(Gather, Interrupted) {
+  struct Stop : Progress {
+    bool cancelled() const override { return true; }
+  };
+  const TestScene test = busyRoom();
+  Stop stop;
+  const auto result = lumel::bake(test.scene, test.atlas, findTexels(test.atlas), {.samples = 4}, stop);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().kind, ErrorKind::Interrupted);
+}
+
+}  // namespace
+}  // namespace lumel
