@@ -19,12 +19,12 @@ namespace lumel {
 struct Flight {
   std::uint32_t lane = 0;  // the texel of the wave that gathers
   std::uint32_t sample = 0;
-  std::uint32_t key = 0;   // of the texel: seeds the choices made at hits
-  int depth = 0;           // hits between the texel and this ray's start
-  Vec3 dirTangent{0};      // of the gather ray
-  Vec3 beta{0};            // weight of the radiance that this ray finds
-  Vec3 origin{0};          // the surface point, before its offset
-  float pdf = 0.0f;        // with which this ray's direction would be gathered, for the weight against light samples
+  std::uint32_t key = 0;  // of the texel: seeds the choices made at hits
+  int depth = 0;          // hits between the texel and this ray's start
+  Vec3 dirTangent{0};     // of the gather ray
+  Vec3 beta{0};           // weight of the radiance that this ray finds
+  Vec3 origin{0};         // the surface point, before its offset
+  float pdf = 0.0f;       // with which this ray's direction would be gathered, for the weight against light samples
 };
 
 /// Sink receives what rays find, in an order that depends on the rays alone:
@@ -80,8 +80,7 @@ class GatherTracer {
     if (!packet_.hit(lane)) {
       if (!transport_.environment.shines()) return;
       const Vec3 dir = directionOf(lane);
-      sink_.light(flight,
-                  transport_.environment.radiance(dir) * misWeight(flight.pdf, transport_.environment.pdf(dir)),
+      sink_.light(flight, transport_.environment.radiance(dir) * misWeight(flight.pdf, transport_.environment.pdf(dir)),
                   flight.depth);
       return;
     }

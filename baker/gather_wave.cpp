@@ -131,7 +131,8 @@ Vec3 GatherWave::reflectanceOf(const SurfacePoint& point, float& opacity) const 
   const std::uint32_t source = surface.sourceTriangle[point.triangle.triangle];
   TrianglePoint at{primitive, source, Vec2(0.0f)};
   for (int k = 0; k < 3; ++k) {
-    const std::uint32_t vertex = surface.indices[std::size_t{3} * point.triangle.triangle + static_cast<std::size_t>(k)];
+    const std::uint32_t vertex =
+        surface.indices[std::size_t{3} * point.triangle.triangle + static_cast<std::size_t>(k)];
     for (int i = 1; i < 3; ++i)
       if (primitive->indices[std::size_t{3} * source + static_cast<std::size_t>(i)] == surface.sourceVertex[vertex])
         at.barycentric[i - 1] = point.barycentric[k];

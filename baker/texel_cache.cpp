@@ -61,15 +61,15 @@ void TexelMap::addSurface(const RayScene& rays, std::uint32_t part, const Surfac
       }
     Vec3 corner[3];
     rays.corners(source, sourceTriangle, corner);
-    triangle.frontNormal =
-        glm::normalize(glm::cross(corner[1] - corner[0], corner[2] - corner[0])) * source.frontSign;
+    triangle.frontNormal = glm::normalize(glm::cross(corner[1] - corner[0], corner[2] - corner[0])) * source.frontSign;
     triangle.page = static_cast<std::uint32_t>(surface.page);
   }
 }
 
 std::size_t TexelMap::pageOf(std::uint32_t texel) const {
   return static_cast<std::size_t>(std::upper_bound(firstOfPage_.begin(), firstOfPage_.end(), texel) -
-                                  firstOfPage_.begin()) - 1;
+                                  firstOfPage_.begin()) -
+         1;
 }
 
 std::uint32_t TexelMap::at(const PageMap& page, int x, int y) const {
@@ -85,8 +85,8 @@ std::uint32_t TexelMap::find(std::uint32_t part, std::uint32_t triangleIndex, Ve
   const Triangle& triangle = triangles_[static_cast<std::size_t>(first) + triangleIndex];
   if (triangle.page == kNoTexel || glm::dot(dirWorld, triangle.frontNormal) > 0.0f) return kNoTexel;
   const PageMap& page = pages_[triangle.page];
-  const Vec2 pixel = (1.0f - barycentric.x - barycentric.y) * triangle.pixels[0] +
-                     barycentric.x * triangle.pixels[1] + barycentric.y * triangle.pixels[2];
+  const Vec2 pixel = (1.0f - barycentric.x - barycentric.y) * triangle.pixels[0] + barycentric.x * triangle.pixels[1] +
+                     barycentric.y * triangle.pixels[2];
   const int x = static_cast<int>(std::floor(pixel.x));
   const int y = static_cast<int>(std::floor(pixel.y));
   if (const std::uint32_t texel = at(page, x, y); texel != kNoTexel) return texel;

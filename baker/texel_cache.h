@@ -40,8 +40,8 @@ class TexelMap {
 
  private:
   struct Triangle {
-    Vec2 pixels[3]{};      // of the source triangle's corners on the page
-    Vec3 frontNormal{0};   // world
+    Vec2 pixels[3]{};               // of the source triangle's corners on the page
+    Vec3 frontNormal{0};            // world
     std::uint32_t page = kNoTexel;  // kNoTexel: no lightmap
   };
   struct PageMap {
@@ -58,8 +58,8 @@ class TexelMap {
   const std::vector<PageTexels>& texels_;
   std::vector<std::uint32_t> firstOfPage_;  // [pages + 1]
   std::vector<PageMap> pages_;
-  std::vector<std::uint32_t> pixels_;       // per pixel of every page: its texel or kNoTexel
-  std::vector<std::int64_t> firstOfPart_;   // per part: into triangles_; -1: no lightmap
+  std::vector<std::uint32_t> pixels_;      // per pixel of every page: its texel or kNoTexel
+  std::vector<std::int64_t> firstOfPart_;  // per part: into triangles_; -1: no lightmap
   std::vector<Triangle> triangles_;
 };
 

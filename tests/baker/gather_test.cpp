@@ -82,7 +82,9 @@ TEST(Gather, FurnaceOfAllBounces) {
     // The warm-up ends where a bounce adds less than 1e-4 of the whole: what is missing is below a / (1 - a) of that,
     // and each pass adds more of it.
     // Noise that all texels share is passed on like light: 0.02% / (1 - a) from seed to seed.
-    EXPECT_NEAR(meanOf(result) * (1 - static_cast<double>(albedo)), 1.0, 2e-3 + 8e-4 / (1 - static_cast<double>(albedo))) << "albedo " << albedo;
+    EXPECT_NEAR(meanOf(result) * (1 - static_cast<double>(albedo)), 1.0,
+                2e-3 + 8e-4 / (1 - static_cast<double>(albedo)))
+        << "albedo " << albedo;
   }
 }
 
@@ -163,7 +165,7 @@ TestScene twoRooms() {
   test.addRectangle({-4, 0, 4}, {0, 0, -4}, {0, 3, 0}, big);  // left
   test.addRectangle({4, 0, 0}, {0, 0, 4}, {0, 3, 0}, big);    // right
   const RectangleOptions small{.material = wall, .texels = 8};
-  for (const float z : {0.0f, 2.5f}) {  // the wall leaves z from 1.5 to 2.5 open
+  for (const float z : {0.0f, 2.5f}) {                                 // the wall leaves z from 1.5 to 2.5 open
     test.addRectangle({-0.5f, 0, z}, {0, 0, 1.5f}, {0, 3, 0}, small);  // faces -x
     test.addRectangle({0.5f, 0, z + 1.5f}, {0, 0, -1.5f}, {0, 3, 0}, small);
   }
@@ -184,13 +186,14 @@ TEST(Gather, SurfacesWithoutTexels) {
     test.integrator = Integrator::Gather;
     const int material = test.addMaterial(Vec3(0.5f), Vec3(1.0f));
     test.addRoom({0, 0, 0}, {1, 1, 1}, {.material = material, .texels = 0});
-    const int page = test.addRectangle({0.2f, 0.01f, 0.8f}, {0.6f, 0, 0}, {0, 0, -0.6f},
-                                       {.material = material, .casts = false});
+    const int page =
+        test.addRectangle({0.2f, 0.01f, 0.8f}, {0.6f, 0, 0}, {0, 0, -0.6f}, {.material = material, .casts = false});
     double expected = 0;
     for (int k = 0; k <= bounces; ++k) expected += std::pow(0.5, k);
     const double tilted = (1 + 1 / std::sqrt(3.0)) / 2 * expected;
-    expectAgreement(deviation(test, {.samples = 256, .bounces = bounces}, page,
-                              [&](const Vec3d&) { return Maps{expected, tilted, tilted, tilted}; }));
+    expectAgreement(deviation(test, {.samples = 256, .bounces = bounces}, page, [&](const Vec3d&) {
+      return Maps{expected, tilted, tilted, tilted};
+    }));
   }
 }
 
