@@ -87,6 +87,8 @@ class TexelSampler {
     return sobol1D(sample, hashCombine(seed_, pattern));
   }
   std::uint32_t seed() const { return seed_; }
+  /// Seed of sobol2D and sobol1D for a pattern.
+  std::uint32_t seedOf(std::uint32_t pattern) const { return hashCombine(seed_, pattern); }
 
  private:
   std::uint32_t seed_ = 0;
