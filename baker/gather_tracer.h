@@ -116,7 +116,7 @@ class GatherTracer {
   }
 
   void leaveToShade(const Flight& flight, const HitSurface& hit) {
-    Spot spot{flight, {hit.p, hit.ng, hit.ns, hit.rayStart}};
+    Spot spot{flight, {hit.p, hit.ng, transport_.rays.shadingNormal(hit), transport_.rays.rayStart(hit)}};
     const Vec3 albedo = transport_.materials.albedo(hit.point);
     const float most = std::max({albedo.x, albedo.y, albedo.z});
     if (most == 0.0f) return;
@@ -131,16 +131,20 @@ class GatherTracer {
 
   void shade(std::span<const Spot> chosen, std::size_t count) {
     LightLanes lanes;
+    SampleLanes samples;
+    std::array<TexelSampler, kLanes> samplers;
+    samples.setSampleOfAll(0);
     std::array<Spot, kLanes> spots;
     std::copy(chosen.begin(), chosen.end(), spots.begin());
     spots_.resize(spots_.size() - count);
     for (std::size_t lane = 0; lane < count; ++lane) {
       lanes.active[lane] = true;
       lanes.receivers[lane] = spots[lane].receiver;
-      lanes.samplers[lane] = samplerAt(spots[lane].flight);
+      samplers[lane] = samplerAt(spots[lane].flight);
+      samples.setTexel(static_cast<int>(lane), samplers[lane]);
     }
     shadowRays_ += directLight(
-        transport_, lanes, 0, 0, TraceMode::Packet, [](float cosTheta) { return cosineHemispherePdf(cosTheta); },
+        transport_, lanes, samples, 0, TraceMode::Packet, [](float cosTheta) { return cosineHemispherePdf(cosTheta); },
         [&](int lane, const Vec3& wi, const Vec3& light) {
           const Spot& spot = spots[static_cast<std::size_t>(lane)];
           sink_.light(spot.flight, light * (glm::dot(wi, spot.receiver.ns) * kInvPi), spot.flight.depth + 1);
@@ -148,7 +152,7 @@ class GatherTracer {
     clear();
     for (std::size_t lane = 0; lane < count; ++lane) {
       const Receiver& receiver = spots[lane].receiver;
-      const Vec3 local = sampleCosineHemisphere(lanes.samplers[lane].get2D(0, kDirection));
+      const Vec3 local = sampleCosineHemisphere(samplers[lane].get2D(0, kDirection));
       const Vec3 dirWorld = frameAround(receiver.ns).fromLocal(local);
       if (!(glm::dot(dirWorld, receiver.ng) > 0.0f)) continue;
       Flight next = spots[lane].flight;

@@ -114,8 +114,8 @@ void GatherWave::drawPoints(std::uint32_t first, std::uint32_t count) {
       const SurfacePoint point = footprints_[lane].sample(samplers_[lane].get2D(first + i, kFootprint));
       const Surface& surface = scene_.atlas.surfaces[point.triangle.surface];
       const std::uint32_t* corner = surface.indices.data() + std::size_t{3} * point.triangle.triangle;
-      const Vec3 corners[3] = {surface.positions[corner[0]], surface.positions[corner[1]],
-                               surface.positions[corner[2]]};
+      const std::array<Vec3, 3> corners = {surface.positions[corner[0]], surface.positions[corner[1]],
+                                           surface.positions[corner[2]]};
       const Vec3 rayStart = offsetPoint(point.position, point.geometricNormal, corners,
                                         scene_.transport.rays.translationOf(surface.instance));
       points_[lane][i] = {{point.position, point.geometricNormal, point.frame.n, rayStart}, point.frame};
@@ -145,9 +145,10 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   std::array<WarmTexel, kLanes> texels;
   drawPoints(0, kWarmLights);
   LightLanes lanes;
+  SampleLanes samples;
   for (std::size_t lane = 0; lane < count_; ++lane) {
     lanes.active[lane] = areas_[lane] > 0;
-    lanes.samplers[lane] = samplers_[lane];
+    samples.setTexel(static_cast<int>(lane), samplers_[lane]);
     if (!lanes.active[lane]) continue;
     Vec3 sum(0.0f);
     float opacities = 0.0f;
@@ -162,8 +163,10 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   for (std::uint32_t s = 0; s < kWarmLights; ++s) {
     for (std::size_t lane = 0; lane < count_; ++lane)
       if (lanes.active[lane]) lanes.receivers[lane] = pointOf(lane, s).receiver;
+    samples.setSampleOfAll(s);
     counts.shadowRays += directLight(
-        scene_.transport, lanes, s, 0, scene_.gatherMode, [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
+        scene_.transport, lanes, samples, 0, scene_.gatherMode,
+        [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
         [&](int lane, const Vec3& wi, const Vec3& light) {
           const auto l = static_cast<std::size_t>(lane);
           const Vec3 flat = light * (glm::dot(wi, lanes.receivers[l].ns) * kInvPi);
@@ -218,19 +221,22 @@ void GatherWave::gatherNet(const NetRange& net, std::span<const Vec3> cache, Gat
   const PageTexels& page = scene_.texels[page_];
   GatherSink sink{scene_, cache, result, page_, std::span(page.coords).subspan(first_, count_)};
   LightLanes lanes;
+  SampleLanes samples;
   std::array<NetByCell, kLanes> nets;
   for (std::size_t lane = 0; lane < count_; ++lane) {
     sink.probed[lane] = (first_ + lane) % PathIntegrator::kProbeStride == 0;
     lanes.active[lane] = areas_[lane] > 0;
-    lanes.samplers[lane] = samplers_[lane];
+    samples.setTexel(static_cast<int>(lane), samplers_[lane]);
     if (lanes.active[lane]) nets[lane].fill(samplers_[lane], net, kDirection);
   }
 
   for (std::uint32_t s = net.first; s < net.first + net.count(); ++s) {
     for (std::size_t lane = 0; lane < count_; ++lane)
       if (lanes.active[lane]) lanes.receivers[lane] = pointOf(lane, s).receiver;
+    samples.setSampleOfAll(s);
     result.shadowRays += directLight(
-        scene_.transport, lanes, s, 0, scene_.gatherMode, [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
+        scene_.transport, lanes, samples, 0, scene_.gatherMode,
+        [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
         [&](int lane, const Vec3& wi, const Vec3& light) {
           const auto l = static_cast<std::uint32_t>(lane);
           sink.add(l, s, pointOf(l, s).frame.toLocal(wi), light * kInvPi, 0);

@@ -59,8 +59,7 @@ void TexelMap::addSurface(const RayScene& rays, std::uint32_t part, const Surfac
         if (surface.sourceVertex[vertex] == sourceCorner[i])
           triangle.pixels[i] = surface.lightmapUvs[vertex] * Vec2(page.width, page.height);
       }
-    Vec3 corner[3];
-    rays.corners(source, sourceTriangle, corner);
+    const std::array<Vec3, 3> corner = rays.corners(source, sourceTriangle);
     triangle.frontNormal = glm::normalize(glm::cross(corner[1] - corner[0], corner[2] - corner[0])) * source.frontSign;
     triangle.page = static_cast<std::uint32_t>(surface.page);
   }
