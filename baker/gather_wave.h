@@ -42,7 +42,6 @@ struct GatherScene {
   int bounces = 0;    // of the result; with endless levels unused
   int lastDepth = 0;  // GatherTracer
   CacheLevels levels{};
-  // Not Coherent: rtcOccluded16 with that flag was seen to loop for ever on a ROBUST scene with alpha cut-outs.
   TraceMode gatherMode = TraceMode::Packet;
 };
 

@@ -20,7 +20,7 @@ struct RawNet {
 };
 
 // Integer work and exact conversions, so that every version of it gives the same bits.
-#if defined(__x86_64__) && defined(__ELF__) && !defined(__SANITIZE_ADDRESS__)
+#if defined(__x86_64__) && defined(__ELF__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 __attribute__((target_clones("avx512f", "avx2", "default")))
 #endif
 void drawNet(std::uint32_t seed, std::uint32_t first, std::uint32_t count, int bitsX, int bitsY, RawNet& net) {
