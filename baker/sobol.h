@@ -86,6 +86,7 @@ class TexelSampler {
   float get1D(std::uint32_t sample, std::uint32_t pattern) const {
     return sobol1D(sample, hashCombine(seed_, pattern));
   }
+  /// Tells texels apart: to seed further samplers.
   std::uint32_t seed() const { return seed_; }
   /// Seed of sobol2D and sobol1D for a pattern.
   std::uint32_t seedOf(std::uint32_t pattern) const { return hashCombine(seed_, pattern); }
