@@ -141,9 +141,12 @@ std::vector<BakedPage> emptyPages(const Atlas& atlas) {
 Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
                                         const std::vector<PageTexels>& texels, const BakeOptions& options,
                                         std::vector<BakedPage>& pages, Progress& progress) {
-  GatherIntegrator integrator(
-      transport, kernels, atlas, texels,
-      {.samples = std::max(1, options.samples), .bounces = options.bounces, .seed = options.seed});
+  GatherIntegrator integrator(transport, kernels, atlas, texels,
+                              {.samples = std::max(1, options.samples),
+                               .bounces = options.bounces,
+                               .seed = options.seed,
+                               .targetError = options.targetError,
+                               .timeBudgetSeconds = static_cast<double>(options.timeBudgetSeconds)});
   if (auto done = integrator.run(progress); !done) return done.error();
   const std::vector<Wave> waves = wavesOf(texels);
   std::vector<WaveStats> waveStats(waves.size() + 1);

@@ -28,6 +28,11 @@ struct BakeOptions {
   Integrator integrator = Integrator::Gather;
   int samples = 256;          // gather rays per texel; rounded up to a power of two would waste: any count >= 1
   int bounces = kAllBounces;  // indirect bounces; 0 = direct light only
+  // Gather alone: sampling ends where the relative standard error is met at 95% of the texels; 0: `samples` for all.
+  float targetError = 0.0f;
+  // Gather alone: no pass is begun that would end later than this; 0: none. The only option whose result depends on
+  // the machine.
+  float timeBudgetSeconds = 0.0f;
   std::uint64_t seed = 1;
   Projection projection = Projection::Flat;
 };

@@ -3,7 +3,9 @@
 #include <xmmintrin.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "scene/parallel.h"
 
@@ -11,6 +13,8 @@ namespace lumel {
 namespace {
 
 constexpr std::uint32_t kFirstPass = 8;
+/// Fewest samples after which an error estimate may end the work on a texel: two doublings, so that a rate is known.
+constexpr std::uint32_t kFirstJudged = 32;
 /// Endless light: the warm-up ends where another bounce adds less than this share, or after so many.
 constexpr double kSettled = 1e-4;
 constexpr int kMostSweeps = 256;
@@ -36,14 +40,17 @@ GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKer
   scene_.bounces = bounces;
   scene_.lastDepth = bounces < 0 ? kLongestPath : bounces;
   scene_.levels = levelsFor(bounces);
-  for (std::uint32_t p = 0; p < texels.size(); ++p)
+  for (std::uint32_t p = 0; p < texels.size(); ++p) {
+    firstWave_.push_back(waves_.size());
     for (std::size_t first = 0; first < texels[p].size(); first += kLanes)
       waves_.push_back({p, static_cast<std::uint32_t>(first),
                         static_cast<std::uint32_t>(std::min<std::size_t>(kLanes, texels[p].size() - first))});
+  }
   const std::size_t count = map_.size();
   sums_.resize(count);
   coverage_.resize(count);
   backFaces_.resize(count);
+  samplesOf_.resize(count);
   reflectance_.resize(count);
   cache_.resize(count * stored());
   if (!scene_.levels.endless) levelSums_.resize(count * stored());
@@ -83,16 +90,25 @@ Expected<void> GatherIntegrator::forEachWave(Progress& progress, Body body) {
 }
 
 Expected<void> GatherIntegrator::run(Progress& progress) {
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  const auto elapsed = [start] { return std::chrono::duration<double>(Clock::now() - start).count(); };
   const auto samples = static_cast<std::uint32_t>(options_.samples);
   progress.begin("bake", map_.size() * std::uint64_t{samples});
   if (scene_.levels.count > 0)
     if (auto warm = warmUp(progress); !warm) return warm;
+  double secondsPerSample = 0.0;
   for (std::uint32_t first = 0; first < samples;) {
     const std::uint32_t end = std::min(samples, std::max(kFirstPass, 2 * first));
+    const double began = elapsed();
+    if (options_.timeBudgetSeconds > 0.0 && first > 0 &&
+        began + secondsPerSample * (end - first) > options_.timeBudgetSeconds)
+      break;
     if (auto done = pass(first, end, progress); !done) return done;
+    secondsPerSample = (elapsed() - began) / (end - first);
     first = end;
+    if (options_.targetError > 0.0f && end >= kFirstJudged && markDone() >= kTargetShare) break;
   }
-  estimateErrors();
   progress.end();
   return {};
 }
@@ -121,7 +137,7 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
     return counts;
   });
   if (!traced) return traced;
-  substituteInvalid(GatherWave::kWarmRays);
+  substituteInvalid(std::vector<std::uint32_t>(count, GatherWave::kWarmRays));
   solveLinks(links, direct, seen, relit);
   std::fill(backFaces_.begin(), backFaces_.end(), 0u);
   return {};
@@ -172,17 +188,18 @@ void GatherIntegrator::solveLinks(std::span<const CacheLink> links, std::span<co
 Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Progress& progress) {
   auto traced = forEachWave(progress, [&](std::size_t w) {
     const Wave& wave = waves_[w];
+    if (wave.done) return GatheredWave{};
     GatherWave texels(scene_, wave.page, wave.first, wave.count);
     GatheredWave done = texels.gather(first, end, cache_);
     for (std::size_t i = 0; i < wave.count; ++i)
       coverage_[map_.firstOfPage(wave.page) + wave.first + i] = texels.coverage(i);
     store(wave, done);
+    std::fill_n(samplesOf_.begin() + map_.firstOfPage(wave.page) + wave.first, wave.count, end);
     progress.advance(std::uint64_t{wave.count} * (end - first));
     return done;
   });
   if (!traced) return traced;
-  samples_ = end;
-  measureSpread(first, end);
+  estimateErrors(first, end);
   if (scene_.levels.count > 0 && end < static_cast<std::uint32_t>(options_.samples)) renewCache();
   return {};
 }
@@ -204,19 +221,19 @@ void GatherIntegrator::store(const Wave& wave, const GatheredWave& done) {
   }
 }
 
-void GatherIntegrator::substituteInvalid(std::uint32_t rays) {
+void GatherIntegrator::substituteInvalid(std::span<const std::uint32_t> rays) {
   std::vector<std::uint8_t> valid(map_.size());
-  for (std::size_t t = 0; t < valid.size(); ++t) valid[t] = 2 * backFaces_[t] <= rays ? 1 : 0;
+  for (std::size_t t = 0; t < valid.size(); ++t) valid[t] = 2 * backFaces_[t] <= rays[t] ? 1 : 0;
   substitutes_ = map_.substitutes(valid);
 }
 
 Vec3 GatherIntegrator::lightOf(std::size_t texel, std::size_t level) const {
   const Vec3& sum = scene_.levels.endless ? sums_[texel].flat : levelSums_[texel * stored() + level];
-  return sum / static_cast<float>(samples_);
+  return sum / static_cast<float>(samplesOf_[texel]);
 }
 
 void GatherIntegrator::renewCache() {
-  substituteInvalid(samples_);
+  substituteInvalid(samplesOf_);
   // The lowest level stays as the warm-up left it where it stands on others that are not kept.
   const std::size_t firstLevel = scene_.levels.base > 0 ? 1 : 0;
   parallelFor(map_.size(), kSweepGrain, [&](std::size_t first, std::size_t last) {
@@ -228,55 +245,67 @@ void GatherIntegrator::renewCache() {
       cache_[s.texel * stored() + l] = reflectance_[s.texel] * lightOf(s.source, l);
 }
 
-/// Half the difference between the means of the samples before a pass and those of the pass.
-void GatherIntegrator::measureSpread(std::uint32_t first, std::uint32_t end) {
+void GatherIntegrator::estimateErrors(std::uint32_t first, std::uint32_t end) {
   if (first == 0) return;
-  const auto n0 = static_cast<float>(first);
-  const auto n1 = static_cast<float>(end - first);
-  double sum = 0.0;
-  for (std::size_t t = 0; t < sums_.size(); ++t) {
-    const float difference = sums_[t].before / n0 - (luminance(sums_[t].flat) - sums_[t].before) / n1;
-    sum += static_cast<double>(difference * difference);
-  }
-  if (end == 2 * first) spreads_.push_back(sum / 4.0);
-}
-
-void GatherIntegrator::estimateErrors() {
-  standardErrors_.assign(map_.size(), 0.0f);
-  if (samples_ < 2 * kFirstPass) return;
-  std::uint32_t first = kFirstPass;
-  while (2 * first < samples_) first *= 2;
   const double n0 = first;
-  const double n1 = samples_ - first;
-  double rate = 1.0;
-  if (spreads_.size() >= 2 && spreads_.back() > 0.0)
-    rate = std::clamp(std::log2(spreads_[spreads_.size() - 2] / spreads_.back()), 1.0, 2.0);
-  const double scale = n0 * n1 / ((n0 + n1) * (n0 + n1)) / (std::exp2(rate) - 1.0);
+  const double n1 = end - first;
   parallelFor(waves_.size(), 256, [&](std::size_t firstWave, std::size_t lastWave) {
     for (std::size_t w = firstWave; w < lastWave; ++w) {
-      const std::size_t start = map_.firstOfPage(waves_[w].page) + waves_[w].first;
+      Wave& wave = waves_[w];
+      if (wave.done) continue;
+      const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
       double sum = 0.0;
-      for (std::size_t t = start; t < start + waves_[w].count; ++t) {
-        const double before = static_cast<double>(sums_[t].before);
+      for (std::size_t t = start; t < start + wave.count; ++t) {
+        const auto before = static_cast<double>(sums_[t].before);
         const double difference = before / n0 - (static_cast<double>(luminance(sums_[t].flat)) - before) / n1;
         sum += difference * difference;
       }
-      const auto error = static_cast<float>(std::sqrt(scale * sum / waves_[w].count));
-      std::fill_n(standardErrors_.begin() + static_cast<std::ptrdiff_t>(start), waves_[w].count, error);
+      wave.spreadBefore = wave.spread;
+      wave.spread = sum * n0 * n1 / ((n0 + n1) * (n0 + n1));
     }
   });
+  double before = 0.0;
+  double now = 0.0;
+  for (const Wave& wave : waves_)
+    if (!wave.done && wave.spreadBefore >= 0.0) {
+      before += wave.spreadBefore;
+      now += wave.spread;
+    }
+  if (end == 2 * first && before > 0.0 && now > 0.0) rate_ = std::clamp(std::log2(before / now), 1.0, 2.0);
+  const double correction = 1.0 / (std::exp2(rate_) - 1.0);
+  for (Wave& wave : waves_)
+    if (!wave.done) wave.standardError = static_cast<float>(std::sqrt(wave.spread / wave.count * correction));
+}
+
+double GatherIntegrator::markDone() {
+  double total = 0.0;
+  for (std::size_t t = 0; t < sums_.size(); ++t) total += static_cast<double>(luminance(sums_[t].flat)) / samplesOf_[t];
+  const double floor = kDarkFloor * total / static_cast<double>(std::max<std::size_t>(1, sums_.size()));
+  std::size_t met = 0;
+  for (Wave& wave : waves_) {
+    if (!wave.done) {
+      const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
+      double darkest = std::numeric_limits<double>::infinity();
+      for (std::size_t t = start; t < start + wave.count; ++t)
+        darkest = std::min(darkest, static_cast<double>(luminance(sums_[t].flat)) / samplesOf_[t]);
+      wave.done = static_cast<double>(wave.standardError) <=
+                  static_cast<double>(options_.targetError) * std::max(darkest, floor);
+    }
+    if (wave.done) met += wave.count;
+  }
+  return sums_.empty() ? 1.0 : static_cast<double>(met) / static_cast<double>(sums_.size());
 }
 
 BakedTexel GatherIntegrator::texel(std::uint32_t page, std::size_t index) const {
   const std::size_t t = map_.firstOfPage(page) + index;
-  const float scale = 1.0f / static_cast<float>(samples_);
+  const float scale = 1.0f / static_cast<float>(std::max(1u, samplesOf_[t]));
   BakedTexel baked;
   baked.value.flat = sums_[t].flat * scale;
   for (std::size_t k = 0; k < 3; ++k) baked.value.rnm[k] = sums_[t].rnm[k] * scale;
   baked.coverage = coverage_[t];
   baked.validity = 1.0f - static_cast<float>(backFaces_[t]) * scale;
-  baked.standardError = standardErrors_[t];
-  baked.samples = coverage_[t] > 0.0f ? samples_ : 0;
+  baked.standardError = waves_[firstWave_[page] + index / kLanes].standardError;
+  baked.samples = coverage_[t] > 0.0f ? samplesOf_[t] : 0;
   baked.probed = index % PathIntegrator::kProbeStride == 0;
   if (baked.probed)
     for (std::size_t k = 0; k < kProbeNormals; ++k) baked.probes[k] = probes_[probeOf(page, index)][k] * scale;

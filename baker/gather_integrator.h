@@ -14,10 +14,17 @@
 namespace lumel {
 
 struct GatherOptions {
-  int samples = 1;
+  int samples = 1;   // per texel; with a target error or a time budget the most
   int bounces = -1;  // indirect bounces; negative: all that matter
   std::uint64_t seed = 1;
+  float targetError = 0.0f;        // relative standard error at which a wave of texels is done; 0: none
+  double timeBudgetSeconds = 0.0;  // no pass is begun that would probably end later; 0: none
 };
+
+/// Share of the texels at which the target error must be met for the bake to end.
+inline constexpr double kTargetShare = 0.95;
+/// The error of texels darker than this share of the mean is judged as if they were so bright.
+inline constexpr double kDarkFloor = 0.1;
 
 /// A texel as it is stored, before finishTexel.
 struct BakedTexel {
@@ -43,6 +50,11 @@ struct BakedTexel {
 /// serves all of them: level k of a texel adds what level k - 1 of the texel that it hit reflects, so the result has
 /// exactly N bounces. Of more than CacheLevels::kMost levels the highest are kept, and the lowest of these stays as the
 /// warm-up left it.
+///
+/// Error: after a pass that doubled a texel's samples let d be half the difference between the means of the two halves.
+/// If the variance of n samples of the sequence falls as n^-rate, then E[d^2] = (2^rate - 1) V[mean] exactly: the two
+/// halves of an Owen-scrambled sequence are not independent, and this is what their dependence amounts to. The rate is
+/// measured, from the spreads of all texels at two successive doublings; d^2 is pooled over a wave of texels.
 class GatherIntegrator {
  public:
   /// Keeps references to its arguments.
@@ -63,6 +75,10 @@ class GatherIntegrator {
     std::uint32_t page = 0;
     std::uint32_t first = 0;  // texel of the page
     std::uint32_t count = 0;
+    bool done = false;     // the target error is met
+    double spread = -1.0;  // sum over texels of d^2 after the last pass
+    double spreadBefore = -1.0;
+    float standardError = 0.0f;
   };
   /// Sums over all samples so far.
   struct Sums {
@@ -77,14 +93,16 @@ class GatherIntegrator {
   Expected<void> pass(std::uint32_t first, std::uint32_t end, Progress& progress);
   void store(const Wave& wave, const GatheredWave& done);
   void renewCache();
-  void substituteInvalid(std::uint32_t rays);
+  /// `rays`: gather rays of each texel.
+  void substituteInvalid(std::span<const std::uint32_t> rays);
   /// Irradiance / pi as of level `level`, from all samples so far.
   Vec3 lightOf(std::size_t texel, std::size_t level) const;
   std::size_t probeOf(std::uint32_t page, std::size_t index) const {
     return firstProbe_[page] + index / PathIntegrator::kProbeStride;
   }
-  void measureSpread(std::uint32_t first, std::uint32_t end);
-  void estimateErrors();
+  void estimateErrors(std::uint32_t first, std::uint32_t end);
+  /// Marks waves that meet the target. Returns the share of texels in such waves.
+  double markDone();
   template <class Body>
   Expected<void> forEachWave(Progress& progress, Body body);
   std::size_t stored() const { return static_cast<std::size_t>(scene_.levels.count); }
@@ -93,6 +111,7 @@ class GatherIntegrator {
   TexelMap map_;
   GatherScene scene_;
   std::vector<Wave> waves_;
+  std::vector<std::size_t> firstWave_;  // per page
   std::vector<Sums> sums_;
   std::vector<Vec3> levelSums_;  // levels.count per texel, unless endless
   std::vector<Vec3> reflectance_;
@@ -101,10 +120,9 @@ class GatherIntegrator {
   std::vector<std::uint32_t> backFaces_;
   std::vector<std::array<Vec3, kProbeNormals>> probes_;
   std::vector<std::size_t> firstProbe_;  // per page
-  std::vector<float> standardErrors_;
-  std::vector<double> spreads_;  // per pass that doubled the samples: mean square of half the halves' difference
+  std::vector<std::uint32_t> samplesOf_;
+  double rate_ = 1.0;
   std::vector<TexelMap::Substitute> substitutes_;
-  std::uint32_t samples_ = 0;
   std::uint64_t rays_ = 0;
   std::uint64_t shadowRays_ = 0;
   std::vector<NonFiniteSample> nonFinite_;

@@ -132,13 +132,16 @@ class GatherTracer {
   void shade(std::span<const Spot> chosen, std::size_t count) {
     LightLanes lanes;
     SampleLanes samples;
+    std::array<TexelSampler, kLanes> samplers;
+    samples.setSampleOfAll(0);
     std::array<Spot, kLanes> spots;
     std::copy(chosen.begin(), chosen.end(), spots.begin());
     spots_.resize(spots_.size() - count);
     for (std::size_t lane = 0; lane < count; ++lane) {
       lanes.active[lane] = true;
       lanes.receivers[lane] = spots[lane].receiver;
-      samples.setTexel(static_cast<int>(lane), samplerAt(spots[lane].flight));
+      samplers[lane] = samplerAt(spots[lane].flight);
+      samples.setTexel(static_cast<int>(lane), samplers[lane]);
     }
     shadowRays_ += directLight(
         transport_, lanes, samples, 0, TraceMode::Packet, [](float cosTheta) { return cosineHemispherePdf(cosTheta); },
@@ -146,11 +149,10 @@ class GatherTracer {
           const Spot& spot = spots[static_cast<std::size_t>(lane)];
           sink_.light(spot.flight, light * (glm::dot(wi, spot.receiver.ns) * kInvPi), spot.flight.depth + 1);
         });
-    const UnitSquareLanes direction = samples.draw2D(kDirection);
     clear();
     for (std::size_t lane = 0; lane < count; ++lane) {
       const Receiver& receiver = spots[lane].receiver;
-      const Vec3 local = sampleCosineHemisphere(direction[static_cast<int>(lane)]);
+      const Vec3 local = sampleCosineHemisphere(samplers[lane].get2D(0, kDirection));
       const Vec3 dirWorld = frameAround(receiver.ns).fromLocal(local);
       if (!(glm::dot(dirWorld, receiver.ng) > 0.0f)) continue;
       Flight next = spots[lane].flight;

@@ -115,7 +115,7 @@ void GatherWave::drawPoints(std::uint32_t first, std::uint32_t count) {
       const Surface& surface = scene_.atlas.surfaces[point.triangle.surface];
       const std::uint32_t* corner = surface.indices.data() + std::size_t{3} * point.triangle.triangle;
       const std::array<Vec3, 3> corners = {surface.positions[corner[0]], surface.positions[corner[1]],
-                               surface.positions[corner[2]]};
+                                           surface.positions[corner[2]]};
       const Vec3 rayStart = offsetPoint(point.position, point.geometricNormal, corners,
                                         scene_.transport.rays.translationOf(surface.instance));
       points_[lane][i] = {{point.position, point.geometricNormal, point.frame.n, rayStart}, point.frame};
@@ -165,7 +165,8 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
       if (lanes.active[lane]) lanes.receivers[lane] = pointOf(lane, s).receiver;
     samples.setSampleOfAll(s);
     counts.shadowRays += directLight(
-        scene_.transport, lanes, samples, 0, scene_.gatherMode, [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
+        scene_.transport, lanes, samples, 0, scene_.gatherMode,
+        [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
         [&](int lane, const Vec3& wi, const Vec3& light) {
           const auto l = static_cast<std::size_t>(lane);
           const Vec3 flat = light * (glm::dot(wi, lanes.receivers[l].ns) * kInvPi);
@@ -234,7 +235,8 @@ void GatherWave::gatherNet(const NetRange& net, std::span<const Vec3> cache, Gat
       if (lanes.active[lane]) lanes.receivers[lane] = pointOf(lane, s).receiver;
     samples.setSampleOfAll(s);
     result.shadowRays += directLight(
-        scene_.transport, lanes, samples, 0, scene_.gatherMode, [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
+        scene_.transport, lanes, samples, 0, scene_.gatherMode,
+        [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
         [&](int lane, const Vec3& wi, const Vec3& light) {
           const auto l = static_cast<std::uint32_t>(lane);
           sink.add(l, s, pointOf(l, s).frame.toLocal(wi), light * kInvPi, 0);

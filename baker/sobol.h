@@ -88,6 +88,8 @@ class TexelSampler {
   }
   /// Tells texels apart: to seed further samplers.
   std::uint32_t seed() const { return seed_; }
+  /// Seed of sobol2D and sobol1D for a pattern.
+  std::uint32_t seedOf(std::uint32_t pattern) const { return hashCombine(seed_, pattern); }
 
  private:
   std::uint32_t seed_ = 0;

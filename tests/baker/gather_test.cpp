@@ -272,6 +272,58 @@ TEST(Gather, NonFiniteSamplesAreNamed) {
     for (const float v : page.flat.pixels) EXPECT_TRUE(std::isfinite(v));
 }
 
+// The reported standard error against the spread from seed to seed. Texels of a wave share one estimate, so this is
+// about the whole: root mean squares.
+TEST(Gather, StandardErrorIsHonest) {
+  for (const int samples : {64, 256}) {
+    TestScene test = busyRoom();
+    test.integrator = Integrator::Gather;
+    constexpr int kRuns = 24;
+    std::vector<double> sum(13 * 13), squares(13 * 13);
+    double claimed = 0;
+    for (int run = 0; run < kRuns; ++run) {
+      const BakeResult result = test.bake({.samples = samples, .seed = static_cast<std::uint64_t>(run) + 100});
+      const BakedPage& page = result.pages[0];
+      for (std::size_t i = 0; i < sum.size(); ++i) {
+        const int x = static_cast<int>(i) % 13, y = static_cast<int>(i) / 13;
+        const double v = static_cast<double>(luminance(page.flat.rgb(x, y)));
+        sum[i] += v;
+        squares[i] += v * v;
+        claimed += static_cast<double>(page.aux.at(x, y)[2]) * static_cast<double>(page.aux.at(x, y)[2]) / kRuns;
+      }
+    }
+    double truth = 0;
+    for (std::size_t i = 0; i < sum.size(); ++i)
+      truth += (squares[i] / kRuns - sum[i] * sum[i] / kRuns / kRuns) * kRuns / (kRuns - 1);
+    const double ratio = std::sqrt(claimed / truth);
+    std::printf("%d samples: claimed / true standard error %.2f\n", samples, ratio);
+    // The rate is one for all texels of a bake of some hundred of them.
+    EXPECT_GT(ratio, 0.8);
+    EXPECT_LT(ratio, 1.25);
+  }
+}
+
+TEST(Gather, SamplesUntilTheTargetErrorIsMet) {
+  TestScene test = busyRoom();
+  test.integrator = Integrator::Gather;
+  std::uint64_t raysBefore = 0;
+  for (const float target : {0.2f, 0.05f, 0.02f}) {
+    const BakeResult result = test.bake({.samples = 1 << 14, .targetError = target});
+    std::size_t met = 0, texels = 0;
+    for (const BakedPage& page : result.pages)
+      for (std::size_t i = 0; i < page.aux.pixels.size(); i += 4) {
+        const float floor = 0.1f * static_cast<float>(result.stats.meanFlat);
+        const float* flat = page.flat.pixels.data() + i / 4 * 3;
+        const float light = std::max(floor, luminance({flat[0], flat[1], flat[2]}));
+        met += page.aux.pixels[i + 2] <= 1.05f * target * light;  // the floor's mean is over valid texels here
+        ++texels;
+      }
+    EXPECT_GE(static_cast<double>(met), 0.94 * static_cast<double>(texels)) << target;
+    EXPECT_GT(result.stats.rays, raysBefore);
+    raysBefore = result.stats.rays;
+  }
+}
+
 TEST(Gather, Interrupted) {
   struct Stop : Progress {
     bool cancelled() const override { return true; }
