@@ -118,6 +118,7 @@ TEST(GltfMaterial, PrimitivesWithoutMaterialGetADefaultAfterTheOthers) {
   EXPECT_EQ(scene.primitive(0, 0).material, 0);
   EXPECT_EQ(scene.primitive(0, 1).material, 1);
   EXPECT_EQ(scene.materials[1].name, "default");
+  EXPECT_EQ(scene.materials[1].baseColor, Vec4(0.8f, 0.8f, 0.8f, 1));
 }
 
 TEST(GltfMaterial, SpecularGlossinessGivesItsDiffuseColour) {
