@@ -185,7 +185,7 @@ int samplesOf(const BakeArguments& a) {
 
 BakeRecord recordOf(const BakeArguments& a, int dilate, nlohmann::ordered_json settings) {
   settings["dilate"] = dilate;
-  settings["bounces"] = describeBounces(a.bake.bounces);
+  if (a.bake.bounces == kAllBounces) settings["bounces"] = describeBounces(a.bake.bounces);
   // What cannot change the result is kept out of the settings, so that equal bakes have equal settings.
   for (const char* key : {"output", "threads"}) settings.erase(key);
   BakeRecord record;
