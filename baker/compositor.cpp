@@ -134,7 +134,7 @@ struct Compositor::Impl {
   Vec3 worldNormal(const Hit& hit) const;
   Vec3 light(const Hit& hit) const;
   Vec3 shade(const Hit& hit, const Vec4& base, RenderMode mode) const;
-  Vec3 radiance(const Vec3& origin, const Vec3& direction, RenderMode mode, float& surface, Sighting* sighting) const;
+  Vec3 radiance(const Vec3& origin, const Vec3& direction, RenderMode mode, float& lit, Sighting* sighting) const;
 
   static void filter(const RTCFilterFunctionNArguments* arguments);
 };
@@ -310,7 +310,7 @@ Vec3 Compositor::Impl::shade(const Hit& hit, const Vec4& base, RenderMode mode) 
   return unlit ? Vec3(base) : Vec3(base) * light(hit) + emission(hit);
 }
 
-Vec3 Compositor::Impl::radiance(const Vec3& origin, const Vec3& direction, RenderMode mode, float& surface,
+Vec3 Compositor::Impl::radiance(const Vec3& origin, const Vec3& direction, RenderMode mode, float& lit,
                                 Sighting* sighting) const {
   constexpr int kMaxLayers = 64;
   Vec3 sum(0.0f);
@@ -323,7 +323,7 @@ Vec3 Compositor::Impl::radiance(const Vec3& origin, const Vec3& direction, Rende
     const Vec4 base = baseColor(hit);
     const float alpha = hit.shape->material->alphaMode == AlphaMode::Blend ? std::clamp(base.w, 0.0f, 1.0f) : 1.0f;
     sum += throughput * alpha * shade(hit, base, mode);
-    surface += throughput * alpha;
+    if (emission(hit) == Vec3(0.0f)) lit += throughput * alpha;
     throughput *= 1.0f - alpha;
     if (sighting && !sighting->surface && alpha > 0.5f) {
       sighting->surface = true;
@@ -359,8 +359,8 @@ Vec3 Compositor::boundsMax() const { return impl_->most; }
 
 Sighting Compositor::look(const Vec3& origin, const Vec3& direction) const {
   Sighting sighting;
-  float surface = 0.0f;
-  sighting.radiance = impl_->radiance(origin, direction, RenderMode::Lit, surface, &sighting);
+  float lit = 0.0f;
+  sighting.radiance = impl_->radiance(origin, direction, RenderMode::Lit, lit, &sighting);
   const RTCRayHit first = impl_->trace(origin, direction, 0.0f, true);
   if (first.hit.geomID == RTC_INVALID_GEOMETRY_ID) return sighting;
   const Hit hit = impl_->hitAt(first.hit.geomID, first.hit.primID, first.hit.u, first.hit.v);
@@ -378,17 +378,17 @@ Expected<Still> Compositor::render(const Camera& camera, const RenderOptions& op
       const int y = static_cast<int>(row);
       for (int x = 0; x < options.width; ++x) {
         Vec3d sum(0.0);
-        float surface = 0.0f;
+        float lit = 0.0f;
         for (int i = 0; i < options.samplesPerPixel; ++i) {
           const Vec2 offset = pixelSample(i);
           Vec3 origin;
           const Vec3 direction =
               rayDirection(camera, 2.0f * (static_cast<float>(x) + offset.x) / width - 1.0f,
                            1.0f - 2.0f * (static_cast<float>(y) + offset.y) / height, width / height, origin);
-          sum += Vec3d(impl_->radiance(origin, direction, options.mode, surface, nullptr));
+          sum += Vec3d(impl_->radiance(origin, direction, options.mode, lit, nullptr));
         }
         still.radiance.setRgb(x, y, Vec3(sum / static_cast<double>(options.samplesPerPixel)));
-        still.surface.at(x, y)[0] = surface / static_cast<float>(options.samplesPerPixel);
+        still.lit.at(x, y)[0] = lit / static_cast<float>(options.samplesPerPixel);
       }
       progress.advance(1);
     }

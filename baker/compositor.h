@@ -28,7 +28,7 @@ struct RenderOptions {
 
 struct Still {
   Image radiance;  // linear RGB
-  Image surface;   // one channel: share of the pixel that shows a surface; the rest is sky
+  Image lit;       // one channel: share of the pixel that shows a lit surface; the rest is sky or shines by itself
 };
 
 /// What one ray sees, for choosing a viewpoint.

@@ -168,7 +168,7 @@ Expected<void> runRender(const RenderArguments& a, CommandContext& context) {
   if (!still) return still.error();
 
   const bool light = a.mode == RenderMode::Lit || a.mode == RenderMode::Lightmap;
-  const float exposure = a.exposure ? *a.exposure : light ? autoExposure(still->radiance, still->surface) : 0.0f;
+  const float exposure = a.exposure ? *a.exposure : light ? autoExposure(still->radiance, still->lit) : 0.0f;
   if (auto written = writeStill(a, *still, describe(*camera), exposure); !written) return written;
   if (!context.quiet)
     std::fprintf(stderr, "%s: %d x %d, camera %s, exposure %.2f EV\n", a.output.c_str(), options.width, options.height,

@@ -13,7 +13,7 @@ float acesFit(float x) { return std::clamp((x * (2.51f * x + 0.03f)) / (x * (2.4
 
 }  // namespace
 
-float autoExposure(const Image& radiance, const Image& surface) {
+float autoExposure(const Image& radiance, const Image& lit) {
   constexpr double kMiddleGrey = 0.16;
   // The brightest part (all but the top two percent) stays within what the curve still separates.
   constexpr double kHighlight = 2.5;
@@ -21,7 +21,7 @@ float autoExposure(const Image& radiance, const Image& surface) {
   std::vector<float> values;
   for (int y = 0; y < radiance.height; ++y)
     for (int x = 0; x < radiance.width; ++x)
-      if (surface.at(x, y)[0] > 0.5f && luminance(radiance.rgb(x, y)) > 0.0f)
+      if (lit.at(x, y)[0] > 0.5f && luminance(radiance.rgb(x, y)) > 0.0f)
         values.push_back(luminance(radiance.rgb(x, y)));
   if (values.empty()) return 0.0f;
   std::sort(values.begin(), values.end());

@@ -11,9 +11,10 @@ enum class ToneMap {
 };
 
 /// Exposure in stops (a factor of 2^EV) that brings the geometric mean of what is in the picture to middle grey
-/// without burning out its bright parts. `surface` weighs the pixels: a bright sky does not darken the scene.
+/// without burning out its bright parts. `lit` chooses the pixels: neither a bright sky nor a lamp in view darkens
+/// the scene.
 /// 0 where nothing is lit.
-float autoExposure(const Image& radiance, const Image& surface);
+float autoExposure(const Image& radiance, const Image& lit);
 
 /// sRGB-encoded values in 0..1, ready for an 8-bit file.
 Image toneMap(const Image& radiance, float exposure, ToneMap curve);
