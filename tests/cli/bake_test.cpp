@@ -100,8 +100,8 @@ TEST(Bake, ProgressOnATerminalOnly) {
     return std::vector<std::string>{
         "bake", LUMEL_SOURCE_DIR "/scenes/cornell.gltf", "-o", dir / "out", "--page-size", "64", "--samples", samples};
   };
-  // Long enough for the line to be drawn at least once (every fifth of a second).
-  const Outcome terminal = runOnTerminal(arguments("512"));
+  // Seconds of work on one core: the line is drawn every fifth of a second.
+  const Outcome terminal = runOnTerminal(arguments("4096"));
   EXPECT_EQ(terminal.exitCode, 0);
   EXPECT_NE(terminal.out.find("\r"), std::string::npos);
   EXPECT_NE(terminal.out.find("% "), std::string::npos);
