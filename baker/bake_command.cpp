@@ -208,13 +208,13 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   context.settings["samples"] = samples;
   const int dilate = a.dilate == kDilateByPadding ? (a.atlas.padding + 1) / 2 : a.dilate;
   BakeRecord record = recordOf(a, dilate, context.settings);
-  if (!context.quiet) printSettings(record.settings);
 
   StageClock clock(context.quiet);
   Progress& progress = context.progress;
   clock.start("load");
   const auto scene = loadLitScene(a);
   if (!scene) return scene.error();
+  if (!context.quiet) printSettings(record.settings);
   if (!context.quiet) printWarnings(scene->report.warnings);
   if (!context.quiet && !hasLight(*scene))
     std::fputs("lumel: warning: the scene has no light and all will be black; give --sky-color or --sky\n", stderr);
