@@ -101,11 +101,12 @@ TEST(Bake, ProgressOnATerminalOnly) {
         "bake", LUMEL_SOURCE_DIR "/scenes/cornell.gltf", "-o", dir / "out", "--page-size", "64", "--samples", samples};
   };
   // Seconds of work on one core: the line is drawn every fifth of a second.
-  const Outcome terminal = runOnTerminal(arguments("4096"));
-  EXPECT_EQ(terminal.exitCode, 0);
-  EXPECT_NE(terminal.out.find("\r"), std::string::npos);
-  EXPECT_NE(terminal.out.find("% "), std::string::npos);
-  EXPECT_NE(terminal.out.find(" left"), std::string::npos) << "no time left in: " << terminal.out;
+  const auto terminal = runOnTerminal(arguments("4096"));
+  if (!terminal) GTEST_SKIP() << "this system gives no pseudo-terminal";
+  EXPECT_EQ(terminal->exitCode, 0);
+  EXPECT_NE(terminal->out.find("\r"), std::string::npos);
+  EXPECT_NE(terminal->out.find("% "), std::string::npos);
+  EXPECT_NE(terminal->out.find(" left"), std::string::npos) << "no time left in: " << terminal->out;
   const Outcome piped = run(arguments("4"));
   EXPECT_EQ(piped.out, "");
   EXPECT_EQ(piped.err.find("\r"), std::string::npos);

@@ -95,9 +95,10 @@ Outcome runAndInterrupt(const std::vector<std::string>& arguments, const std::st
   return runWatching(arguments, &sign);
 }
 
-Outcome runOnTerminal(const std::vector<std::string>& arguments) {
+std::optional<Outcome> runOnTerminal(const std::vector<std::string>& arguments) {
   int terminal = -1;
   const pid_t child = forkpty(&terminal, nullptr, nullptr, nullptr);
+  if (child < 0) return std::nullopt;
   if (child == 0) becomeLumel(arguments);
   Outcome outcome;
   while (readSome(terminal, outcome.out)) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,8 +21,8 @@ struct Outcome {
 /// Runs `lumel ARGUMENTS...` with both outputs in pipes.
 Outcome run(const std::vector<std::string>& arguments);
 
-/// The same with all output on a terminal; `out` holds what the terminal got.
-Outcome runOnTerminal(const std::vector<std::string>& arguments);
+/// The same with all output on a terminal; `out` holds what the terminal got. Nothing where the system has none to give.
+std::optional<Outcome> runOnTerminal(const std::vector<std::string>& arguments);
 
 /// Starts it, sends SIGINT once its standard error holds `sign`, and waits for the end.
 Outcome runAndInterrupt(const std::vector<std::string>& arguments, const std::string& sign);
