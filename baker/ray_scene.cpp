@@ -38,35 +38,7 @@ float rayHash(RTCRayN* ray, unsigned int rays, unsigned int lane, std::uint32_t 
   return unitFloat(h);
 }
 
-}  // namespace
-
-void RayPacket::clear() { std::fill(std::begin(valid), std::end(valid), 0); }
-
-void RayPacket::set(int lane, const Vec3& origin, const Vec3& dir) {
-  RTCRay16& ray = rayhit.ray;
-  ray.org_x[lane] = origin.x;
-  ray.org_y[lane] = origin.y;
-  ray.org_z[lane] = origin.z;
-  ray.dir_x[lane] = dir.x;
-  ray.dir_y[lane] = dir.y;
-  ray.dir_z[lane] = dir.z;
-  ray.tnear[lane] = 0.0f;
-  ray.tfar[lane] = std::numeric_limits<float>::infinity();
-  ray.time[lane] = 0.0f;
-  ray.mask[lane] = 0xffffffffu;
-  ray.id[lane] = 0;
-  ray.flags[lane] = 0;
-  rayhit.hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
-  rayhit.hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
-  valid[lane] = -1;
-}
-
-void ShadowPacket::clear() {
-  std::fill(std::begin(valid), std::end(valid), 0);
-  any = false;
-}
-
-void ShadowPacket::set(int lane, const Vec3& origin, const Vec3& dir, float length) {
+void setRay(RTCRay16& ray, int lane, const Vec3& origin, const Vec3& dir, float length) {
   ray.org_x[lane] = origin.x;
   ray.org_y[lane] = origin.y;
   ray.org_z[lane] = origin.z;
@@ -79,6 +51,26 @@ void ShadowPacket::set(int lane, const Vec3& origin, const Vec3& dir, float leng
   ray.mask[lane] = 0xffffffffu;
   ray.id[lane] = 0;
   ray.flags[lane] = 0;
+}
+
+}  // namespace
+
+void RayPacket::clear() { std::fill(std::begin(valid), std::end(valid), 0); }
+
+void RayPacket::set(int lane, const Vec3& origin, const Vec3& dir) {
+  setRay(rayhit.ray, lane, origin, dir, std::numeric_limits<float>::infinity());
+  rayhit.hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
+  rayhit.hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
+  valid[lane] = -1;
+}
+
+void ShadowPacket::clear() {
+  std::fill(std::begin(valid), std::end(valid), 0);
+  any = false;
+}
+
+void ShadowPacket::set(int lane, const Vec3& origin, const Vec3& dir, float length) {
+  setRay(ray, lane, origin, dir, length);
   valid[lane] = -1;
   any = true;
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "lightmap/triangle_overlap.h"
+
 namespace lumel {
 namespace {
 
@@ -301,19 +303,7 @@ class OverlapGrid {
     const std::array<Vec2d, 3> a = corners(s);
     const std::array<Vec2d, 3> b = corners(t);
     if (!(cornerArea(a) > 0) || !(cornerArea(b) > 0)) return false;  // no area to lie on anything
-    return !separated(a, b) && !separated(b, a);
-  }
-
-  bool separated(const std::array<Vec2d, 3>& a, const std::array<Vec2d, 3>& b) const {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vec2d edge = a[(k + 1) % 3] - a[k];
-      const double length = glm::length(edge);
-      if (!(length > 0)) continue;
-      const Vec2d outward(edge.y / length, -edge.x / length);
-      const double reach = std::min({glm::dot(outward, b[0] - a[k]), glm::dot(outward, b[1] - a[k]), glm::dot(outward, b[2] - a[k])});
-      if (reach > -tolerance_) return true;
-    }
-    return false;
+    return trianglesOverlap(a, b, tolerance_);
   }
 
   const ChartMesh& chart_;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lightmap/triangle_overlap.h"
+
 namespace lumel {
 namespace {
 
@@ -13,19 +15,6 @@ constexpr int kSeeds = 4;                // edges that are tried as the one that
 
 std::uint64_t cellKey(std::int64_t x, std::int64_t y) {
   return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32) | static_cast<std::uint32_t>(y);
-}
-
-/// Whether along an edge normal of `a` the triangles come apart, up to the tolerance.
-bool separated(const std::array<Vec2d, 3>& a, const std::array<Vec2d, 3>& b) {
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vec2d edge = a[(k + 1) % 3] - a[k];
-    const double length = glm::length(edge);
-    if (!(length > 0)) continue;
-    const Vec2d outward(edge.y / length, -edge.x / length);
-    const double reach = std::min({glm::dot(outward, b[0] - a[k]), glm::dot(outward, b[1] - a[k]), glm::dot(outward, b[2] - a[k])});
-    if (reach > -kOverlapTexels) return true;
-  }
-  return false;
 }
 
 double doubleArea(const std::array<Vec2d, 3>& t) { return cross2(t[1] - t[0], t[2] - t[0]); }
@@ -257,7 +246,7 @@ bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const RigidMoti
         if (cell == target.border.end() || hit) return;
         for (const MeshEdge edge : cell->second) {
           const std::array<Vec2d, 3> other = corners(edge.triangle);
-          if (doubleArea(other) > 0 && doubleArea(uv) > 0 && !separated(uv, other) && !separated(other, uv)) hit = true;
+          if (doubleArea(other) > 0 && doubleArea(uv) > 0 && trianglesOverlap(uv, other, kOverlapTexels)) hit = true;
         }
       });
       if (hit) return false;
