@@ -26,6 +26,8 @@ constexpr int kDilateByPadding = -1;
 /// Samples per texel of the gather. In a Cornell box the flat map's RMS error is about 11%, 4.3% and 1.9% of its mean.
 enum class Quality { Draft, Preview, Production };
 constexpr std::array<int, 3> kQualitySamples = {16, 64, 256};
+/// Auto: where --quality asks for less than production.
+enum class Denoise { Auto, On, Off };
 /// Most samples where a target error is given and --samples is not.
 constexpr int kMostSamples = 16384;
 
@@ -34,6 +36,7 @@ struct BakeArguments {
   fs::path output;
   AtlasOptions atlas;
   BakeOptions bake;
+  Denoise denoise = Denoise::Auto;
   int dilate = kDilateByPadding;
   bool half = false;
   int threads = 0;
@@ -97,6 +100,9 @@ void declareOptions(OptionTable& options, BakeArguments& a) {
   output.placeholder = "DIR";
   output.required = true;
   options.flag("half", a.half, "Write half floats: half the size, values up to 65504");
+  options.choice("denoise", a.denoise, {"auto", "on", "off"},
+                 "Average texels with those around them that agree within their noise; auto: for the qualities draft "
+                 "and preview");
   options.integer("dilate", a.dilate, {0, 1024}, "Rings of texels grown around charts; 0: none").defaultText =
       "half of --padding";
   options.flag("allow-outside-paths", a.allowOutsidePaths, "Let the scene name files outside its own folder");
@@ -183,6 +189,11 @@ int samplesOf(const BakeArguments& a) {
   return a.bake.targetError > 0.0f ? kMostSamples : kQualitySamples[static_cast<std::size_t>(a.quality)];
 }
 
+bool denoises(const BakeArguments& a) {
+  if (a.denoise != Denoise::Auto) return a.denoise == Denoise::On;
+  return a.quality != Quality::Production;
+}
+
 BakeRecord recordOf(const BakeArguments& a, int dilate, nlohmann::ordered_json settings) {
   settings["dilate"] = dilate;
   if (a.bake.bounces == kAllBounces) settings["bounces"] = describeBounces(a.bake.bounces);
@@ -206,6 +217,7 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   const ThreadLimit limit(a.threads);
   const int samples = samplesOf(a);
   context.settings["samples"] = samples;
+  context.settings["denoise"] = denoises(a) ? "on" : "off";
   const int dilate = a.dilate == kDilateByPadding ? (a.atlas.padding + 1) / 2 : a.dilate;
   BakeRecord record = recordOf(a, dilate, context.settings);
 
@@ -230,7 +242,7 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   auto baked = bake(*scene, atlas->atlas, texels, record.bakeOptions, progress);
   if (!baked) return baked.error();
   clock.start("finish");
-  finishPages(baked->pages, atlas->atlas, texels, dilate);
+  finishPages(baked->pages, atlas->atlas, texels, {.denoise = denoises(a), .rings = dilate});
   clock.stop();
   if (progress.cancelled()) return interrupted();
 

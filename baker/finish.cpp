@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "lightmap/denoise.h"
 #include "lightmap/dilate.h"
 #include "scene/parallel.h"
 
@@ -19,7 +20,7 @@ struct PageState {
   bool hasHoles = false;
 };
 
-PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& texels) {
+PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& texels, bool needCharts) {
   const std::size_t count = page.aux.pixels.size() / 4;
   PageState state;
   state.covered = state.valid = {page.aux.width, page.aux.height, std::vector<std::uint8_t>(count, 0)};
@@ -32,7 +33,7 @@ PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& t
     (aux[1] < kLeastValidity ? state.holes[i] : state.valid.known[i]) = 1;
   }
   state.hasHoles = std::find(state.holes.begin(), state.holes.end(), 1) != state.holes.end();
-  if (!state.hasHoles) return state;
+  if (!state.hasHoles && !needCharts) return state;
   for (std::size_t texel = 0; texel < texels.size(); ++texel) {
     const TexelCoord at = texels.coords[texel];
     const TriangleRef triangle = texels.trianglesOf(texel).front();
@@ -42,19 +43,33 @@ PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& t
   return state;
 }
 
+void denoisePage(BakedPage& page, const PageState& state) {
+  const std::size_t count = state.chartIds.size();
+  std::vector<std::uint32_t> charts(count, 0);
+  std::vector<float> standardError(count, 0.0f);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (state.valid.known[i] == 0) continue;
+    charts[i] = state.chartIds[i];
+    standardError[i] = page.aux.pixels[i * 4 + 2];
+  }
+  denoise(page.flat, page.rnm, charts, standardError);
+}
+
 }  // namespace
 
-void finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels, int rings) {
+void finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                 const FinishOptions& options) {
   constexpr std::size_t kMaps = 4;
   for (std::size_t p = 0; p < pages.size(); ++p) {
     BakedPage& page = pages[p];
-    const PageState state = stateOf(page, atlas, texels[p]);
+    const PageState state = stateOf(page, atlas, texels[p], options.denoise);
+    if (options.denoise) denoisePage(page, state);
     parallelFor(kMaps, 1, [&](std::size_t first, std::size_t last) {
       for (std::size_t i = first; i < last; ++i) {
         Image& map = i < 3 ? page.rnm[i] : page.flat;
         if (state.hasHoles) fillHoles(map, state.valid, state.chartIds, state.holes);
         TexelMask known = state.covered;
-        if (rings > 0) dilate(map, known, rings);
+        if (options.rings > 0) dilate(map, known, options.rings);
       }
     });
   }

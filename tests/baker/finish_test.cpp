@@ -38,7 +38,7 @@ struct Fixture {
 TEST(Finish, InvalidTexelsTakeTheLightOfTheirChart) {
   Fixture f;
   const Image auxBefore = f.pages[0].aux;
-  finishPages(f.pages, f.atlas, f.texels, 0);
+  finishPages(f.pages, f.atlas, f.texels, {});
   for (const Image* map : {&f.pages[0].rnm[0], &f.pages[0].rnm[2], &f.pages[0].flat}) {
     EXPECT_EQ(map->rgb(0, 0).x, 1.0f);
     EXPECT_EQ(map->rgb(1, 0).x, 3.0f);
@@ -51,7 +51,7 @@ TEST(Finish, InvalidTexelsTakeTheLightOfTheirChart) {
 
 TEST(Finish, DilationGrowsBeyondWhatIsCovered) {
   Fixture f;
-  finishPages(f.pages, f.atlas, f.texels, 1);
+  finishPages(f.pages, f.atlas, f.texels, {.rings = 1});
   EXPECT_EQ(f.pages[0].flat.rgb(3, 0).x, (3.0f + 0.25f) / 2);
   EXPECT_EQ(f.pages[0].flat.rgb(5, 0).x, 0.25f);
 }

@@ -1,13 +1,15 @@
-// Speed of packing, texel finding, footprints, projection and dilation. Figures mean something on an idle machine only.
+// Speed of packing, texel finding, footprints, projection, denoising and dilation. Figures mean something on an idle machine only.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
 #include <random>
 
+#include "lightmap/denoise.h"
 #include "lightmap/dilate.h"
 #include "lightmap/pack.h"
 #include "lightmap/projection.h"
 #include "lightmap/texels.h"
+#include "scene/parallel.h"
 
 namespace lumel {
 namespace {
@@ -135,6 +137,29 @@ void BM_Dilate(benchmark::State& state) {
     benchmark::DoNotOptimize(image.pixels.data());
   }
 }
+/// A page of 1024 x 1024, nine tenths of it in charts of 96 x 96, under noise: as a preview leaves it.
+void BM_Denoise(benchmark::State& state) {
+  const int side = 1024;
+  const ThreadLimit limit(static_cast<int>(state.range(0)));
+  std::mt19937 random(3);
+  std::normal_distribution<float> noise(1.0f, 0.05f);
+  Image map(side, side, 3);
+  for (float& v : map.pixels) v = noise(random);
+  std::vector<std::uint32_t> charts(std::size_t{side} * side, 0);
+  for (std::size_t i = 0; i < charts.size(); ++i) {
+    const std::size_t x = i % side, y = i / side;
+    if (x % 101 < 96 && y % 101 < 96) charts[i] = static_cast<std::uint32_t>(1 + x / 101 + y / 101 * 11);
+  }
+  const std::vector<float> errors(charts.size(), 0.05f);
+  for (auto _ : state) {
+    Image flat = map;
+    std::array<Image, 3> rnm = {map, map, map};
+    denoise(flat, rnm, charts, errors);
+    benchmark::DoNotOptimize(flat.pixels.data());
+  }
+}
+BENCHMARK(BM_Denoise)->Arg(1)->Arg(2)->Arg(4)->Unit(benchmark::kMillisecond)->UseRealTime();
+
 BENCHMARK(BM_Dilate)->Arg(4)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace

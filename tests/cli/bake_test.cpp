@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "scene/image_io.h"
 #include "tests/cli/harness.h"
@@ -78,6 +79,38 @@ TEST(Bake, SameBytesForAnyNumberOfThreads) {
   EXPECT_EQ(resultOf(one), resultOf(two));
   ASSERT_EQ(one.size(), 6u);  // five images of one page and the scene
   for (const auto& [name, bytes] : one) EXPECT_TRUE(bytes == two[name]) << name;
+}
+
+TEST(Bake, TheLesserQualitiesAreDenoised) {
+  const auto dir = scratch();
+  nlohmann::json gltf = gltfOf(boxFromInside());
+  gltf["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {0.5, 0.5, 0.5, 1.0};
+  gltf["materials"][0]["emissiveFactor"] = {1.0, 1.0, 1.0};
+  writeFile(dir / "furnace.gltf", gltf.dump());
+  // Relative spread of the flat map around the furnace's light.
+  const auto spread = [&](const std::string& name, const std::vector<std::string>& options) {
+    std::vector<std::string> arguments = {"bake", dir / "furnace.gltf", "-o",        dir / name, "--uv",   "scene",
+                                          "--page-size", "48",          "--bounces", "1",        "--dilate", "0"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exitCode, 0) << outcome.err;
+    double squares = 0.0;
+    int covered = 0;
+    for (const float light : readPixels(dir / name / "lightmap-0-flat.exr").pixels) {
+      if (light == 0.0f) continue;
+      squares += (static_cast<double>(light) - 1.5) * (static_cast<double>(light) - 1.5);
+      ++covered;
+    }
+    return std::sqrt(squares / covered) / 1.5;
+  };
+  const double noisy = spread("off", {"--quality", "draft", "--denoise", "off"});
+  const double denoised = spread("auto", {"--quality", "draft"});
+  EXPECT_LT(denoised, 0.4 * noisy);  // about 0.2 in rooms of this size; broken, it is 1
+  EXPECT_GT(noisy, 0.005);
+  EXPECT_EQ(spread("on", {"--samples", "16", "--denoise", "on"}), denoised);
+  EXPECT_EQ(spread("production", {"--samples", "16"}), noisy);
+  EXPECT_EQ(readJson(dir / "auto" / "bake.json")["settings"]["denoise"], "on");
+  EXPECT_EQ(readJson(dir / "production" / "bake.json")["settings"]["denoise"], "off");
 }
 
 TEST(Bake, InterruptedLeavesTheOldResultWhole) {

@@ -1,0 +1,25 @@
+// Takes sampling noise out of a finished page: every texel becomes a weighted mean of the texels of its chart around
+// it that agree with it within their noise (non-local means with known variance: Buades et al. 2005; Rousselle et al.
+// 2012, "Adaptive Rendering with Non-Local Means Filtering", eq. 4).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "scene/image.h"
+
+namespace lumel {
+
+/// Texels up to so far apart, in x and in y, are compared and averaged.
+inline constexpr int kDenoiseRadius = 5;
+
+/// `flat` and `rnm`: RGB images of one size. Per texel, row by row: `chartIds`, 0 where a texel is neither read nor
+/// changed; `standardError` of the flat map's luminance. All four maps of a texel are averaged with the same weights,
+/// so what holds for them linearly (the mean of the three maps is the flat one) goes on to hold. A texel without noise
+/// keeps its value among texels that differ from it. Values that are not finite spread no further than the texel.
+/// Parallel and deterministic.
+void denoise(Image& flat, std::array<Image, 3>& rnm, std::span<const std::uint32_t> chartIds,
+             std::span<const float> standardError);
+
+}  // namespace lumel

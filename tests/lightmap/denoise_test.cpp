@@ -1,0 +1,169 @@
+#include "lightmap/denoise.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "scene/parallel.h"
+
+namespace lumel {
+namespace {
+
+constexpr int kSide = 64;
+
+/// A page of one chart under the light `truth(x, y)`, with independent noise of standard deviation `sigma` in the flat
+/// map and 1.4 times as much in the others.
+struct Page {
+  Image flat{kSide, kSide, 3};
+  std::array<Image, 3> rnm{Image(kSide, kSide, 3), Image(kSide, kSide, 3), Image(kSide, kSide, 3)};
+  std::vector<std::uint32_t> charts = std::vector<std::uint32_t>(kSide * kSide, 1);
+  std::vector<float> errors;
+
+  template <class Truth>
+  Page(const Truth& truth, float sigma) : errors(kSide * kSide, sigma) {
+    std::mt19937 random(5);
+    std::normal_distribution<float> noise(0.0f, 1.0f);
+    for (int y = 0; y < kSide; ++y)
+      for (int x = 0; x < kSide; ++x) {
+        flat.setRgb(x, y, Vec3(truth(x, y) + sigma * noise(random)));
+        for (Image& map : rnm) map.setRgb(x, y, Vec3(truth(x, y) + 1.4f * sigma * noise(random)));
+      }
+  }
+  void denoise() { lumel::denoise(flat, rnm, charts, errors); }
+};
+
+template <class Truth>
+double rmsError(const Image& map, const Truth& truth) {
+  double squares = 0;
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x) {
+      const double d = static_cast<double>(map.rgb(x, y).x) - static_cast<double>(truth(x, y));
+      squares += d * d;
+    }
+  return std::sqrt(squares / (kSide * kSide));
+}
+
+TEST(Denoise, SmoothLightKeepsATenthOfItsNoiseAndItsMean) {
+  const auto truth = [](int x, int y) { return 1.0f + 0.002f * static_cast<float>(x) + 0.001f * static_cast<float>(y); };
+  Page page(truth, 0.1f);
+  page.denoise();
+  // The mean of 121 alike texels would keep 1/11 = 0.009; the weights are not all alike, and noise of the weights
+  // themselves is left. Twice that is allowed.
+  EXPECT_LT(rmsError(page.flat, truth), 0.018);
+  EXPECT_LT(rmsError(page.rnm[1], truth), 0.025);
+  double mean = 0;
+  for (const float v : page.flat.pixels) mean += static_cast<double>(v);
+  EXPECT_NEAR(mean / static_cast<double>(page.flat.pixels.size()), 1.0945, 0.0045);  // 3 x 0.1 / 64, as it came in
+}
+
+TEST(Denoise, AShadowsEdgeStaysWhereItIs) {
+  const auto truth = [](int x, int) { return x < kSide / 2 ? 1.0f : 0.2f; };
+  Page page(truth, 0.05f);
+  page.denoise();
+  EXPECT_LT(rmsError(page.flat, truth), 0.02);
+  for (int y = 0; y < kSide; ++y) {
+    EXPECT_GT(page.flat.rgb(kSide / 2 - 1, y).x, 0.85f);
+    EXPECT_LT(page.flat.rgb(kSide / 2, y).x, 0.35f);
+  }
+}
+
+TEST(Denoise, WithoutNoiseNothingChanges) {
+  const auto truth = [](int x, int y) { return 1.0f + 0.5f * std::sin(0.3f * static_cast<float>(x * 3 + y)); };
+  Page page(truth, 0.0f);
+  const Image before = page.flat;
+  page.denoise();
+  for (std::size_t i = 0; i < before.pixels.size(); ++i)
+    EXPECT_NEAR(page.flat.pixels[i], before.pixels[i], 1e-4f);  // equal neighbours are averaged: rounding alone
+}
+
+TEST(Denoise, ChartsAreStrangersAndUncoveredTexelsStay) {
+  const auto truth = [](int, int) { return 1.0f; };
+  Page page(truth, 0.1f);
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x) {
+      const auto i = static_cast<std::size_t>(y * kSide + x);
+      page.charts[i] = x < 20 ? 1u : x < 24 ? 0u : 2u;
+      if (x >= 24) page.flat.setRgb(x, y, page.flat.rgb(x, y) + Vec3(0.05f));  // well within the noise
+      if (page.charts[i] == 0) page.flat.setRgb(x, y, Vec3(77.0f));
+    }
+  page.denoise();
+  double left = 0, right = 0;
+  for (int y = 0; y < kSide; ++y) {
+    left += static_cast<double>(page.flat.rgb(19, y).x) / kSide;
+    right += static_cast<double>(page.flat.rgb(24, y).x) / kSide;
+    EXPECT_EQ(page.flat.rgb(22, y).x, 77.0f);
+  }
+  EXPECT_NEAR(left, 1.0, 0.02);  // 0.1 / sqrt(64 rows of about 6 x 11 / 64 independent ones each): about 0.005
+  EXPECT_NEAR(right, 1.05, 0.02);
+}
+
+TEST(Denoise, TheMapsMeanStaysTheFlatMap) {
+  const auto truth = [](int x, int y) { return x > y ? 2.0f : 1.0f; };
+  Page page(truth, 0.2f);
+  for (std::size_t i = 0; i < page.flat.pixels.size(); ++i)
+    page.flat.pixels[i] = (page.rnm[0].pixels[i] + page.rnm[1].pixels[i] + page.rnm[2].pixels[i]) / 3.0f;
+  page.denoise();
+  for (std::size_t i = 0; i < page.flat.pixels.size(); ++i)
+    EXPECT_NEAR(page.flat.pixels[i], (page.rnm[0].pixels[i] + page.rnm[1].pixels[i] + page.rnm[2].pixels[i]) / 3.0f,
+                1e-5f);
+}
+
+TEST(Denoise, ScaleDoesNotMatter) {
+  const auto truth = [](int x, int) { return x < 30 ? 1.0f : 1.3f; };
+  Page one(truth, 0.1f);
+  one.denoise();
+  for (const float scale : {1e-12f, 1e12f}) {
+    Page page(truth, 0.1f);
+    for (float& v : page.flat.pixels) v *= scale;
+    for (Image& map : page.rnm)
+      for (float& v : map.pixels) v *= scale;
+    for (float& e : page.errors) e *= scale;
+    page.denoise();
+    for (std::size_t i = 0; i < page.flat.pixels.size(); i += 37)
+      EXPECT_NEAR(page.flat.pixels[i] / scale, one.flat.pixels[i], 1e-4f);
+  }
+}
+
+TEST(Denoise, WhatIsNotANumberSpreadsNoFurther) {
+  const auto truth = [](int, int) { return 1.0f; };
+  Page page(truth, 0.1f);
+  page.flat.setRgb(30, 30, Vec3(std::numeric_limits<float>::quiet_NaN()));
+  page.rnm[2].setRgb(10, 12, Vec3(std::numeric_limits<float>::infinity()));
+  page.denoise();
+  std::size_t bad = 0;
+  for (const Image* map : {&page.flat, &page.rnm[0], &page.rnm[1], &page.rnm[2]})
+    for (const float v : map->pixels)
+      if (!std::isfinite(v)) ++bad;
+  EXPECT_EQ(bad, 6u);
+}
+
+TEST(Denoise, SameBytesForAnyThreadCount) {
+  const auto truth = [](int x, int y) { return static_cast<float>((x / 7 + y / 5) % 3); };
+  Page one(truth, 0.3f);
+  Page four(truth, 0.3f);
+  {
+    const ThreadLimit limit(1);
+    one.denoise();
+  }
+  const ThreadLimit limit(4);
+  four.denoise();
+  EXPECT_EQ(one.flat.pixels, four.flat.pixels);
+  EXPECT_EQ(one.rnm[2].pixels, four.rnm[2].pixels);
+}
+
+TEST(Denoise, PagesSmallerThanThePatch) {
+  for (const int side : {0, 1, 2}) {
+    Image flat(side, side, 3, 0.5f);
+    std::array<Image, 3> rnm = {flat, flat, flat};
+    const std::vector<std::uint32_t> charts(flat.pixels.size() / 3, 1);
+    const std::vector<float> errors(charts.size(), 0.1f);
+    denoise(flat, rnm, charts, errors);
+    for (const float v : flat.pixels) EXPECT_FLOAT_EQ(v, 0.5f);
+  }
+}
+
+}  // namespace
+}  // namespace lumel
