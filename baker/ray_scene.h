@@ -29,9 +29,11 @@ struct alignas(64) RayPacket {
   RTCRayHit16 rayhit;
   alignas(64) int valid[kLanes];
 
-  RayPacket() { clear(); }
+  /// No lane is set; what is the same for all rays is.
+  RayPacket();
   void clear();
   void set(int lane, const Vec3& origin, const Vec3& dir);
+  Vec3 direction(int lane) const { return {rayhit.ray.dir_x[lane], rayhit.ray.dir_y[lane], rayhit.ray.dir_z[lane]}; }
   bool hit(int lane) const { return valid[lane] != 0 && rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID; }
 };
 
@@ -41,7 +43,7 @@ struct alignas(64) ShadowPacket {
   alignas(64) int valid[kLanes];
   bool any = false;
 
-  ShadowPacket() { clear(); }
+  ShadowPacket();
   void clear();
   /// `length` in units of |dir|.
   void set(int lane, const Vec3& origin, const Vec3& dir, float length);
@@ -81,16 +83,19 @@ inline float offsetDistance(const std::array<Vec3, 3>& corners, float translatio
          (std::max(std::max(largest.x, largest.y), largest.z) + translation);
 }
 
+/// The move that offsetPoint makes; `inwards`: the sum of the vectors to the triangle's corners.
+inline Vec3 rayOffset(const Vec3& ng, const Vec3& inwards, float distance) {
+  const float reach = glm::length(inwards);
+  // At most half the way to the centroid, which lies at inwards / 3.
+  const float share = reach > 6.0f * distance ? distance / reach : 1.0f / 6.0f;
+  return ng * distance + inwards * share;
+}
+
 /// The start of a ray that leaves p, a point of the triangle, on the side of ng. It is moved by offsetDistance along
 /// the normal, so that rounding cannot put it behind the surface, and as far towards the triangle's centroid, so that
 /// it cannot lie beyond a wall that stands on the triangle's edge.
 inline Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const std::array<Vec3, 3>& corners, float translation) {
-  const float distance = offsetDistance(corners, translation);
-  const Vec3 inwards = (corners[0] - p) + (corners[1] - p) + (corners[2] - p);
-  const float reach = glm::length(inwards);
-  // At most half the way to the centroid, which lies at inwards / 3.
-  const float share = reach > 6.0f * distance ? distance / reach : 1.0f / 6.0f;
-  return p + (ng * distance + inwards * share);
+  return p + rayOffset(ng, (corners[0] - p) + (corners[1] - p) + (corners[2] - p), offsetDistance(corners, translation));
 }
 
 class RayScene {
