@@ -213,6 +213,7 @@ void RayScene::alphaFilter(const RTCFilterFunctionNArguments* args) {
 
 void RayScene::intersect(RayPacket& rays, TraceMode mode) const {
   RTCIntersectContext context = newContext();
+  if (mode == TraceMode::Coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   if (mode != TraceMode::Single) {
     rtcIntersect16(rays.valid, top_.get(), &context, &rays.rayhit);
     return;
@@ -235,6 +236,7 @@ void RayScene::intersect(RayPacket& rays, TraceMode mode) const {
 
 void RayScene::occluded(ShadowPacket& rays, TraceMode mode) const {
   if (!rays.any) return;
+  LUMEL_CHECK(mode != TraceMode::Coherent);
   RTCIntersectContext context = newContext();
   if (mode != TraceMode::Single) {
     rtcOccluded16(rays.valid, top_.get(), &context, &rays.ray);
