@@ -47,6 +47,9 @@ struct GatherSink {
   const Vec3* reflectedBy(std::uint32_t texel) const {
     return cache.data() + std::size_t{texel} * static_cast<std::size_t>(scene.levels.count);
   }
+  void prefetch(std::uint32_t texel) const {
+    if (scene.levels.count > 0) __builtin_prefetch(reflectedBy(texel));
+  }
   void report(std::size_t lane, std::uint32_t sample) { result.nonFinite.push_back({page, coords[lane], sample}); }
 
   void addProbes(std::size_t lane, const Vec3& dirTangent, const Vec3& light) {
@@ -245,20 +248,21 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   WarmSink sink{texels, links};
   GatherTracer tracer(scene_.transport, scene_.map, scene_.lastDepth, sink);
   SampleLanes samples = lightSamples_;
+  AimedRays& rays = packets_[0].rays;
   for (std::uint32_t s = 0; s < kWarmRays; ++s) {
     const PointLanes& from = points_[s];
     samples.setSampleOfAll(s);
     const UnitSquareLanes u = samples.draw2D(kWarmDirection);
     // By the cosine every ray counts alike, so that no texel passes on more than it receives.
-    aimCosineRays(u.x, u.y, from, rays_);
-    scene_.transport.rays.intersect(rays_.packet, TraceMode::Packet);
+    aimCosineRays(u.x, u.y, from, rays);
+    scene_.transport.rays.intersect(rays.packet, TraceMode::Packet);
     for (std::size_t lane = 0; lane < count_; ++lane) {
-      if (!rays_.packet.valid[lane]) continue;
+      if (!rays.packet.valid[lane]) continue;
       ++counts.rays;
-      Flight flight = flightOf(lane, s, from, rays_);
+      Flight flight = flightOf(lane, s, from, rays);
       flight.key = samplers_[lane].seedOf(kWarmHits);
       flight.beta = Vec3(1.0f);
-      tracer.arrive(rays_.packet, static_cast<int>(lane), flight);
+      tracer.arrive(rays.packet, static_cast<int>(lane), flight);
     }
   }
   tracer.finish();
@@ -307,10 +311,25 @@ void GatherWave::gatherLight(const NetRange& net, GatherSink& sink) {
 void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
   net_.fill(samplers_, covered_, net, kDirection);
   GatherTracer tracer(scene_.transport, scene_.map, scene_.lastDepth, sink);
-  for (std::uint32_t cell = 0; cell < net.count(); ++cell) {
-    gatherPacket(cell, tracer, sink);
+  const std::uint32_t count = net.count();
+  // While one packet is traced, memory is asked for what those before it hit.
+  for (std::uint32_t step = 0; step < count + kInFlight - 1; ++step) {
+    const auto packet = [&](std::uint32_t age) -> Packet& { return packets_[(step - age) % kInFlight]; };
+    const auto inFlight = [&](std::uint32_t age) { return step >= age && step - age < count; };
+    if (inFlight(0)) {
+      packet(0).cell = step;
+      launch(packet(0));
+    }
+    if (inFlight(1)) scene_.map.findPixels(packet(1).rays.packet, packet(1).lookup);
+    if (inFlight(2)) {
+      scene_.map.findTexels(packet(2).lookup);
+      for (const std::uint32_t texel : packet(2).lookup.texels)
+        if (texel != kNoTexel) sink.prefetch(texel);
+    }
+    if (!inFlight(3)) continue;
+    collect(packet(3), tracer, sink);
     // Sums of a few samples lose nothing as floats.
-    if ((cell & 15u) == 15u) settle(sink.sums, sink.totals);
+    if ((packet(3).cell & 15u) == 15u) settle(sink.sums, sink.totals);
   }
   tracer.finish();
   settle(sink.sums, sink.totals);
@@ -318,33 +337,36 @@ void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
   sink.result.shadowRays += tracer.shadowRays();
 }
 
-/// The rays of all lanes in one cell of the net. They share the number of their footprint point too: all points of a
-/// texel are used by every 16 neighbouring cells.
-void GatherWave::gatherPacket(std::uint32_t cell, GatherTracer<GatherSink>& tracer, GatherSink& sink) {
-  const PointLanes& from = points_[cell];
-  aimGatherRays(net_.x(cell), net_.y(cell), from, rays_);
-  scene_.transport.rays.intersect(rays_.packet, scene_.gatherMode);
+/// Sends the rays of all lanes into one cell of the net. They share the number of their footprint point too: any 16
+/// neighbouring cells use all points of a texel.
+void GatherWave::launch(Packet& packet) const {
+  aimGatherRays(net_.x(packet.cell), net_.y(packet.cell), points_[packet.cell], packet.rays);
+  scene_.transport.rays.intersect(packet.rays.packet, scene_.gatherMode);
+  scene_.map.findTriangles(packet.rays.packet, packet.lookup);
+}
 
-  std::array<std::uint32_t, kLanes> texels;
-  scene_.map.find(rays_.packet, texels);
+void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer, GatherSink& sink) const {
+  const AimedRays& rays = packet.rays;
   const int level = scene_.levels.read(scene_.bounces, 0);
   const bool shines = scene_.transport.environment.shines();
   Vec3Lanes light;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    if (!rays_.packet.valid[lane]) continue;
+    if (!rays.packet.valid[lane]) continue;
     ++sink.result.rays;
-    const float beta = kInvPi / rays_.pdf[lane];
-    if (texels[lane] != kNoTexel) {
-      if (level >= 0) light.set(lane, beta * sink.reflectedBy(texels[lane])[level]);
-      sink.passOnLevels(lane, rays_.dirTangent[lane], Vec3(beta), texels[lane], 0);
-    } else if (rays_.packet.hit(static_cast<int>(lane))) {
-      tracer.arrive(rays_.packet, static_cast<int>(lane), flightOf(lane, net_.sample(cell, lane), from, rays_));
+    const float beta = kInvPi / rays.pdf[lane];
+    const std::uint32_t texel = packet.lookup.texels[lane];
+    if (texel != kNoTexel) {
+      if (level >= 0) light.set(lane, beta * sink.reflectedBy(texel)[level]);
+      sink.passOnLevels(lane, rays.dirTangent[lane], Vec3(beta), texel, 0);
+    } else if (rays.packet.hit(static_cast<int>(lane))) {
+      tracer.arrive(rays.packet, static_cast<int>(lane),
+                    flightOf(lane, net_.sample(packet.cell, lane), points_[packet.cell], rays));
     } else if (shines) {
-      light.set(lane, beta * tracer.skyTowards(rays_.packet.direction(static_cast<int>(lane)), rays_.pdf[lane]));
-      if (isFinite(light[lane])) sink.addToLevels(lane, rays_.dirTangent[lane], light[lane], 0);
+      light.set(lane, beta * tracer.skyTowards(rays.packet.direction(static_cast<int>(lane)), rays.pdf[lane]));
+      if (isFinite(light[lane])) sink.addToLevels(lane, rays.dirTangent[lane], light[lane], 0);
     }
   }
-  sink.addToMaps(rays_.dirTangent, light, [&](std::size_t lane) { return net_.sample(cell, lane); });
+  sink.addToMaps(rays.dirTangent, light, [&](std::size_t lane) { return net_.sample(packet.cell, lane); });
 }
 
 }  // namespace lumel

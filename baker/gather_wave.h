@@ -107,7 +107,14 @@ class GatherWave {
   Flight flightOf(std::size_t lane, std::uint32_t sample, const PointLanes& from, const AimedRays& rays) const;
   void gatherLight(const NetRange& net, GatherSink& sink);
   void gatherRays(const NetRange& net, GatherSink& sink);
-  void gatherPacket(std::uint32_t cell, GatherTracer<GatherSink>& tracer, GatherSink& sink);
+  /// A packet of gather rays, from its start to where the light of its texels is known.
+  struct Packet {
+    std::uint32_t cell = 0;  // of the net
+    AimedRays rays;
+    TexelMap::Lookup lookup;
+  };
+  void launch(Packet& packet) const;
+  void collect(const Packet& packet, GatherTracer<GatherSink>& tracer, GatherSink& sink) const;
 
   const GatherScene& scene_;
   std::uint32_t page_;
@@ -118,7 +125,8 @@ class GatherWave {
   std::array<bool, kLanes> covered_{};
   SampleLanes lightSamples_;
   NetLanes net_;
-  AimedRays rays_;
+  static constexpr std::uint32_t kInFlight = 4;
+  std::array<Packet, kInFlight> packets_;
 };
 
 }  // namespace lumel

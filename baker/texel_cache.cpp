@@ -86,16 +86,6 @@ bool TexelMap::fromBehind(std::uint32_t part, const RayPacket& packet, int lane)
   return glm::dot(packet.direction(lane), front) > 0.0f;
 }
 
-std::uint32_t TexelMap::texelAt(const Triangle& triangle, float u, float v) const {
-  if (triangle.page == kNoTexel) return kNoTexel;
-  const PageMap& page = pages_[triangle.page];
-  const Vec2 pixel = triangle.pixel + u * triangle.perU + v * triangle.perV;
-  if (const std::uint32_t texel = at(page, static_cast<int>(std::floor(pixel.x)), static_cast<int>(std::floor(pixel.y)));
-      texel != kNoTexel)
-    return texel;
-  return texelBeside(page, pixel);
-}
-
 /// A point on a chart's border may round to the texel beside it.
 std::uint32_t TexelMap::texelBeside(const PageMap& page, const Vec2& pixel) const {
   const int x = static_cast<int>(std::floor(pixel.x));
@@ -111,16 +101,50 @@ std::uint32_t TexelMap::find(std::uint32_t part, const RayPacket& packet, int la
   const std::int64_t first = parts_[part].firstTriangle;
   if (first < 0 || fromBehind(part, packet, lane)) return kNoTexel;
   const RTCHit16& hit = packet.rayhit.hit;
-  return texelAt(triangles_[static_cast<std::size_t>(first) + hit.primID[lane]], hit.u[lane], hit.v[lane]);
+  const Triangle& triangle = triangles_[static_cast<std::size_t>(first) + hit.primID[lane]];
+  if (triangle.page == kNoTexel) return kNoTexel;
+  const PageMap& page = pages_[triangle.page];
+  const Vec2 pixel = triangle.at(hit.u[lane], hit.v[lane]);
+  const std::uint32_t texel = at(page, static_cast<int>(std::floor(pixel.x)), static_cast<int>(std::floor(pixel.y)));
+  return texel != kNoTexel ? texel : texelBeside(page, pixel);
 }
 
-void TexelMap::find(const RayPacket& packet, std::array<std::uint32_t, kLanes>& texels) const {
-  for (int lane = 0; lane < kLanes; ++lane) {
-    std::uint32_t& texel = texels[static_cast<std::size_t>(lane)];
-    texel = kNoTexel;
-    if (!packet.hit(lane)) continue;
-    const std::uint32_t part = rays_.partOf(packet, lane);
-    if (!parts_[part].shines) texel = find(part, packet, lane);
+void TexelMap::findTriangles(const RayPacket& packet, Lookup& lookup) const {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    lookup.triangles[lane] = nullptr;
+    if (!packet.hit(static_cast<int>(lane))) continue;
+    const std::uint32_t part = rays_.partOf(packet, static_cast<int>(lane));
+    const PartMap& map = parts_[part];
+    if (map.shines || map.firstTriangle < 0 || fromBehind(part, packet, static_cast<int>(lane))) continue;
+    lookup.triangles[lane] =
+        &triangles_[static_cast<std::size_t>(map.firstTriangle) + packet.rayhit.hit.primID[lane]];
+    __builtin_prefetch(lookup.triangles[lane]);
+  }
+}
+
+void TexelMap::findPixels(const RayPacket& packet, Lookup& lookup) const {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Triangle* triangle = lookup.triangles[lane];
+    lookup.pixels[lane] = nullptr;
+    if (!triangle || triangle->page == kNoTexel) continue;
+    const PageMap& page = pages_[triangle->page];
+    lookup.places[lane] = triangle->at(packet.rayhit.hit.u[lane], packet.rayhit.hit.v[lane]);
+    // Rounding may lead over the page's border.
+    const int x = std::clamp(static_cast<int>(lookup.places[lane].x), 0, page.width - 1);
+    const int y = std::clamp(static_cast<int>(lookup.places[lane].y), 0, page.height - 1);
+    lookup.pixels[lane] = pixels_.data() + page.first +
+                          static_cast<std::size_t>(y) * static_cast<std::size_t>(page.width) +
+                          static_cast<std::size_t>(x);
+    __builtin_prefetch(lookup.pixels[lane]);
+  }
+}
+
+void TexelMap::findTexels(Lookup& lookup) const {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const std::uint32_t* pixel = lookup.pixels[lane];
+    lookup.texels[lane] = pixel ? *pixel : kNoTexel;
+    if (pixel && *pixel == kNoTexel)
+      lookup.texels[lane] = texelBeside(pages_[lookup.triangles[lane]->page], lookup.places[lane]);
   }
 }
 

@@ -30,8 +30,13 @@ class TexelMap {
   /// its back was hit, or the point lies (by rounding) beside all texels of the page. Precondition: packet.hit(lane).
   std::uint32_t find(std::uint32_t part, const RayPacket& packet, int lane) const;
 
-  /// The same for all lanes of a packet; kNoTexel also where nothing was hit, or something that shines by itself.
-  void find(const RayPacket& packet, std::array<std::uint32_t, kLanes>& texels) const;
+  /// The same for all lanes of a packet, in three steps: each asks memory for what the next one reads, so that a caller
+  /// can do other work in between. The result is `texels`: kNoTexel also where nothing was hit, or something that
+  /// shines by itself.
+  struct Lookup;
+  void findTriangles(const RayPacket& packet, Lookup& lookup) const;
+  void findPixels(const RayPacket& packet, Lookup& lookup) const;
+  void findTexels(Lookup& lookup) const;
 
   /// For each texel that is not `valid`: the nearest valid one of the same chart, within kReach texels; pairs of
   /// (texel, source) in the order of texels. Texels without such a neighbour are left out.
@@ -46,6 +51,8 @@ class TexelMap {
   struct alignas(32) Triangle {
     Vec2 pixel{0}, perU{0}, perV{0};  // on the page: of the first corner, and how it moves with the barycentrics
     std::uint32_t page = kNoTexel;    // kNoTexel: no lightmap
+
+    Vec2 at(float u, float v) const { return pixel + u * perU + v * perV; }
   };
   struct PartMap {
     std::int64_t firstTriangle = -1;  // into triangles_; -1: no lightmap
@@ -58,7 +65,6 @@ class TexelMap {
   };
   void addSurface(std::uint32_t part, const Surface& surface);
   bool fromBehind(std::uint32_t part, const RayPacket& packet, int lane) const;
-  std::uint32_t texelAt(const Triangle& triangle, float u, float v) const;
   std::uint32_t texelBeside(const PageMap& page, const Vec2& pixel) const;
   std::uint32_t at(const PageMap& page, int x, int y) const;
   std::uint32_t chartOf(const PageTexels& page, std::size_t texel) const;
@@ -72,6 +78,16 @@ class TexelMap {
   std::vector<std::uint32_t> pixels_;      // per pixel of every page: its texel or kNoTexel
   std::vector<PartMap> parts_;
   std::vector<Triangle> triangles_;
+};
+
+struct TexelMap::Lookup {
+  std::array<std::uint32_t, kLanes> texels;
+
+ private:
+  friend TexelMap;
+  std::array<const Triangle*, kLanes> triangles;
+  std::array<const std::uint32_t*, kLanes> pixels;
+  std::array<Vec2, kLanes> places;
 };
 
 }  // namespace lumel

@@ -242,6 +242,21 @@ BENCHMARK(speedup)
     ->Iterations(1)
     ->Unit(benchmark::kSecond);
 
+/// The gather alone, for a profiler.
+void gather(benchmark::State& state) {
+  const Fixture& f = fixture(static_cast<int>(state.range(0)));
+  _mm_setcsr(_mm_getcsr() | 0x8040u);
+  const std::vector<std::size_t> firsts = spreadWaves(f, 256);
+  std::int64_t rays = 0;
+  for (auto _ : state)
+    for (const std::size_t first : firsts) {
+      GatherWave wave(f.scene, 0, first, kLanes);
+      rays += static_cast<std::int64_t>(wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache).rays);
+    }
+  state.SetItemsProcessed(rays);
+}
+BENCHMARK(gather)->ArgNames({"foliage", "rays"})->ArgsProduct({{Rooms, Foliage}, {16, 64, 256}})->Unit(benchmark::kMillisecond);
+
 void smoke(benchmark::State& state) {
   compare(state, Rooms, 16, TraceMode::Packet, 2, 1);
   compare(state, Rooms, 16, TraceMode::Coherent, 2, 1);
