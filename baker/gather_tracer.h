@@ -38,17 +38,38 @@ class GatherTracer {
   GatherTracer(const LightTransport& transport, const TexelMap& map, int lastDepth, Sink& sink)
       : transport_(transport), map_(map), lastDepth_(lastDepth), sink_(sink) {}
 
-  /// Begins a packet; then set() for its lanes, then trace().
-  void clear() { packet_.clear(); }
-  void set(int lane, const Flight& flight, const Vec3& rayStart, const Vec3& dirWorld) {
-    flights_[static_cast<std::size_t>(lane)] = flight;
-    packet_.set(lane, rayStart, dirWorld);
-    ++rays_;
+  /// What a traced ray found. Precondition: packet.valid[lane].
+  void arrive(const RayPacket& packet, int lane, const Flight& flight) {
+    if (!packet.hit(lane)) {
+      if (transport_.environment.shines())
+        sink_.light(flight, skyTowards(packet.direction(lane), flight.pdf), flight.depth);
+      return;
+    }
+    const std::uint32_t part = transport_.rays.partOf(packet, lane);
+    const bool emits = transport_.rays.parts()[part].firstEmitter >= 0;
+    const std::uint32_t texel = flight.depth < lastDepth_ ? map_.find(part, packet, lane) : kNoTexel;
+    if (!emits && texel != kNoTexel) {
+      sink_.texel(flight, texel);
+      return;
+    }
+    const HitSurface hit = transport_.rays.surfaceAt(packet, lane);
+    if (flight.depth == 0 && hit.backFace && !transport_.materials.material(hit.material).doubleSided)
+      sink_.backFace(flight);
+    if (emits) {
+      const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
+      if (emitted != Vec3(0.0f))
+        sink_.light(flight, emitted * misWeight(flight.pdf, transport_.emissive.pdf(hit, flight.origin)), flight.depth);
+    }
+    if (texel != kNoTexel)
+      sink_.texel(flight, texel);
+    else if (flight.depth < lastDepth_)
+      leaveToShade(flight, hit);
   }
-  void trace(TraceMode mode) {
-    transport_.rays.intersect(packet_, mode);
-    for (int lane = 0; lane < kLanes; ++lane)
-      if (packet_.valid[lane]) arrive(lane);
+
+  /// The sky's radiance for a ray that was gathered with density `pdf`. Precondition: environment.shines().
+  Vec3 skyTowards(const Vec3& dirWorld, float pdf) const {
+    const Vec3 radiance = transport_.environment.radiance(dirWorld);
+    return transport_.environment.sampled() ? radiance * misWeight(pdf, transport_.environment.pdf(dirWorld)) : radiance;
   }
 
   /// Follows what was left to be shaded on the spot, in full packets.
@@ -71,48 +92,9 @@ class GatherTracer {
   static constexpr std::uint32_t kDirection = kLightPatterns;
   static constexpr std::uint32_t kRoulette = kLightPatterns + 1;
 
+  /// One sequence for all samples of a texel that are shaded after so many hits.
   static TexelSampler samplerAt(const Flight& flight) {
-    return {flight.key, flight.sample, static_cast<std::uint32_t>(flight.depth), 0u};
-  }
-
-  void arrive(int lane) {
-    Flight& flight = flights_[static_cast<std::size_t>(lane)];
-    if (!packet_.hit(lane)) {
-      if (!transport_.environment.shines()) return;
-      const Vec3 dir = directionOf(lane);
-      sink_.light(flight, transport_.environment.radiance(dir) * misWeight(flight.pdf, transport_.environment.pdf(dir)),
-                  flight.depth);
-      return;
-    }
-    const std::uint32_t part = transport_.rays.partOf(packet_, lane);
-    const bool emits = transport_.rays.parts()[part].firstEmitter >= 0;
-    const std::uint32_t texel = flight.depth < lastDepth_ ? texelAt(part, lane) : kNoTexel;
-    if (!emits && texel != kNoTexel) {
-      sink_.texel(flight, texel);
-      return;
-    }
-    const HitSurface hit = transport_.rays.surfaceAt(packet_, lane);
-    if (flight.depth == 0 && hit.backFace && !transport_.materials.material(hit.material).doubleSided)
-      sink_.backFace(flight);
-    if (emits) {
-      const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
-      if (emitted != Vec3(0.0f))
-        sink_.light(flight, emitted * misWeight(flight.pdf, transport_.emissive.pdf(hit, flight.origin)), flight.depth);
-    }
-    if (texel != kNoTexel)
-      sink_.texel(flight, texel);
-    else if (flight.depth < lastDepth_)
-      leaveToShade(flight, hit);
-  }
-
-  std::uint32_t texelAt(std::uint32_t part, int lane) const {
-    const RTCHit16& hit = packet_.rayhit.hit;
-    return map_.find(part, hit.primID[lane], {hit.u[lane], hit.v[lane]}, directionOf(lane));
-  }
-
-  Vec3 directionOf(int lane) const {
-    const RTCRay16& ray = packet_.rayhit.ray;
-    return {ray.dir_x[lane], ray.dir_y[lane], ray.dir_z[lane]};
+    return {flight.key, static_cast<std::uint32_t>(flight.depth), 0u, 0u};
   }
 
   void leaveToShade(const Flight& flight, const HitSurface& hit) {
@@ -123,7 +105,7 @@ class GatherTracer {
     spot.flight.beta *= albedo;
     if (flight.depth >= kRouletteAfter) {
       const float survival = std::max(most, 0.05f);
-      if (samplerAt(flight).get1D(0, kRoulette) >= survival) return;
+      if (samplerAt(flight).get1D(flight.sample, kRoulette) >= survival) return;
       spot.flight.beta /= survival;
     }
     spots_.push_back(spot);
@@ -133,7 +115,6 @@ class GatherTracer {
     LightLanes lanes;
     SampleLanes samples;
     std::array<TexelSampler, kLanes> samplers;
-    samples.setSampleOfAll(0);
     std::array<Spot, kLanes> spots;
     std::copy(chosen.begin(), chosen.end(), spots.begin());
     spots_.resize(spots_.size() - count);
@@ -142,6 +123,7 @@ class GatherTracer {
       lanes.receivers[lane] = spots[lane].receiver;
       samplers[lane] = samplerAt(spots[lane].flight);
       samples.setTexel(static_cast<int>(lane), samplers[lane]);
+      samples.setSample(static_cast<int>(lane), spots[lane].flight.sample);
     }
     shadowRays_ += directLight(
         transport_, lanes, samples, 0, TraceMode::Packet, [](float cosTheta) { return cosineHemispherePdf(cosTheta); },
@@ -149,27 +131,29 @@ class GatherTracer {
           const Spot& spot = spots[static_cast<std::size_t>(lane)];
           sink_.light(spot.flight, light * (glm::dot(wi, spot.receiver.ns) * kInvPi), spot.flight.depth + 1);
         });
-    clear();
+    RayPacket packet;
+    std::array<Flight, kLanes> flights;
     for (std::size_t lane = 0; lane < count; ++lane) {
       const Receiver& receiver = spots[lane].receiver;
-      const Vec3 local = sampleCosineHemisphere(samplers[lane].get2D(0, kDirection));
+      const Vec3 local = sampleCosineHemisphere(samplers[lane].get2D(spots[lane].flight.sample, kDirection));
       const Vec3 dirWorld = frameAround(receiver.ns).fromLocal(local);
       if (!(glm::dot(dirWorld, receiver.ng) > 0.0f)) continue;
-      Flight next = spots[lane].flight;
-      ++next.depth;
-      next.origin = receiver.p;
-      next.pdf = cosineHemispherePdf(local.z);
-      set(static_cast<int>(lane), next, receiver.rayStart, dirWorld);
+      flights[lane] = spots[lane].flight;
+      ++flights[lane].depth;
+      flights[lane].origin = receiver.p;
+      flights[lane].pdf = cosineHemispherePdf(local.z);
+      packet.set(static_cast<int>(lane), receiver.rayStart, dirWorld);
+      ++rays_;
     }
-    trace(TraceMode::Packet);
+    transport_.rays.intersect(packet, TraceMode::Packet);
+    for (int lane = 0; lane < kLanes; ++lane)
+      if (packet.valid[lane]) arrive(packet, lane, flights[static_cast<std::size_t>(lane)]);
   }
 
   const LightTransport& transport_;
   const TexelMap& map_;
   const int lastDepth_;
   Sink& sink_;
-  RayPacket packet_;
-  std::array<Flight, kLanes> flights_;
   std::vector<Spot> spots_;
   std::uint64_t rays_ = 0;
   std::uint64_t shadowRays_ = 0;

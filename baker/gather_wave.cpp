@@ -30,6 +30,8 @@ struct WarmSink {
   void backFace(const Flight& flight) { ++texels[flight.lane].backFaces; }
 };
 
+}  // namespace
+
 /// Adds light to the maps and to the levels of the cache.
 struct GatherSink {
   const GatherScene& scene;
@@ -37,49 +39,120 @@ struct GatherSink {
   GatheredWave& result;
   std::uint32_t page;
   std::span<const TexelCoord> coords;
-  std::array<bool, kLanes> probed{};
+  std::size_t probedLane = kLanes;  // at most one texel of a wave is probed
+  MapSums sums{};
+  MapTotals totals{};
 
-  bool accept(std::uint32_t lane, std::uint32_t sample, const Vec3& light) {
-    if (isFinite(light)) return true;
-    result.nonFinite.push_back({page, coords[lane], sample});
-    return false;
+  /// Radiance that a texel reflects, by level.
+  const Vec3* reflectedBy(std::uint32_t texel) const {
+    return cache.data() + std::size_t{texel} * static_cast<std::size_t>(scene.levels.count);
   }
-  void addToMaps(std::uint32_t lane, const Vec3& dirTangent, const Vec3& light) {
-    GatheredTexel& texel = result.texels[lane];
+  void prefetch(std::uint32_t texel) const {
+    if (scene.levels.count > 0) __builtin_prefetch(reflectedBy(texel));
+  }
+  void report(std::size_t lane, std::uint32_t sample) { result.nonFinite.push_back({page, coords[lane], sample}); }
+
+  void addProbes(std::size_t lane, const Vec3& dirTangent, const Vec3& light) {
+    for (std::size_t i = 0; i < kProbeNormals; ++i)
+      result.texels[lane].probes[i] += Vec3d(light * std::max(0.0f, glm::dot(dirTangent, probeNormals()[i])));
+  }
+  void addToMaps(std::size_t lane, const Vec3& dirTangent, const Vec3& light) {
     const Vec3 kernels = scene.kernels(dirTangent);
-    texel.flat += Vec3d(light * std::max(0.0f, dirTangent.z));
-    for (int i = 0; i < 3; ++i) texel.rnm[static_cast<std::size_t>(i)] += Vec3d(light * kernels[i]);
-    if (probed[lane])
-      for (std::size_t i = 0; i < kProbeNormals; ++i)
-        texel.probes[i] += Vec3d(light * std::max(0.0f, glm::dot(dirTangent, probeNormals()[i])));
+    const std::array<float, 4> k = {std::max(0.0f, dirTangent.z), kernels.x, kernels.y, kernels.z};
+    for (std::size_t map = 0; map < 4; ++map)
+      for (int channel = 0; channel < 3; ++channel)
+        sums.sum[3 * map + static_cast<std::size_t>(channel)][lane] += light[channel] * k[map];
+    if (lane == probedLane) addProbes(lane, dirTangent, light);
   }
-  /// Light of `depth` bounces, for the maps and for every level that holds so many.
-  void add(std::uint32_t lane, std::uint32_t sample, const Vec3& dirTangent, const Vec3& light, int depth) {
-    if (!accept(lane, sample, light)) return;
-    addToMaps(lane, dirTangent, light);
+  /// The same for all lanes; `sampleOf(lane)` names a sample that is not finite.
+  template <class SampleOf>
+  void addToMaps(const Vec3Lanes& dirTangent, const Vec3Lanes& light, SampleOf sampleOf) {
+    Vec3Lanes kernels;
+    if (scene.kernels.clampedDots())
+      clampedDots(dirTangent, kernels);
+    else
+      for (std::size_t lane = 0; lane < kLanes; ++lane) kernels.set(lane, scene.kernels(dirTangent[lane]));
+    if (addLight(dirTangent, kernels, light, sums))
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        if (!isFinite(light[lane])) report(lane, sampleOf(lane));
+    if (probedLane < kLanes && isFinite(light[probedLane])) addProbes(probedLane, dirTangent[probedLane], light[probedLane]);
+  }
+  /// Light of `depth` bounces, for every level that holds so many.
+  void addToLevels(std::size_t lane, const Vec3& dirTangent, const Vec3& light, int depth) {
     if (scene.levels.endless) return;
     const Vec3d flat(light * std::max(0.0f, dirTangent.z));
     for (int level = std::max(0, depth - scene.levels.base); level < scene.levels.count; ++level)
       result.texels[lane].levels[static_cast<std::size_t>(level)] += flat;
   }
+  /// What a texel that was found after `depth` hits sends on, for the levels that read it.
+  void passOnLevels(std::size_t lane, const Vec3& dirTangent, const Vec3& beta, std::uint32_t texel, int depth) {
+    const CacheLevels& levels = scene.levels;
+    if (levels.endless) return;
+    const Vec3 weight = beta * std::max(0.0f, dirTangent.z);
+    for (int level = 0; level < levels.count; ++level)
+      if (const int source = levels.read(levels.base + level, depth); source >= 0)
+        result.texels[lane].levels[static_cast<std::size_t>(level)] += Vec3d(weight * reflectedBy(texel)[source]);
+  }
+
+  // What GatherTracer asks of a sink.
   void light(const Flight& flight, const Vec3& radiance, int depth) {
-    add(flight.lane, flight.sample, flight.dirTangent, flight.beta * radiance, depth);
+    const Vec3 light = flight.beta * radiance;
+    if (!isFinite(light)) return report(flight.lane, flight.sample);
+    addToMaps(flight.lane, flight.dirTangent, light);
+    addToLevels(flight.lane, flight.dirTangent, light, depth);
   }
   void texel(const Flight& flight, std::uint32_t texel) {
-    const CacheLevels& levels = scene.levels;
-    const Vec3* reflected = cache.data() + std::size_t{texel} * static_cast<std::size_t>(levels.count);
-    if (const int level = levels.read(scene.bounces, flight.depth); level >= 0) {
-      const Vec3 light = flight.beta * reflected[level];
-      if (!accept(flight.lane, flight.sample, light)) return;
+    if (const int level = scene.levels.read(scene.bounces, flight.depth); level >= 0) {
+      const Vec3 light = flight.beta * reflectedBy(texel)[level];
+      if (!isFinite(light)) return report(flight.lane, flight.sample);
       addToMaps(flight.lane, flight.dirTangent, light);
     }
-    if (levels.endless) return;
-    const Vec3 weight = flight.beta * std::max(0.0f, flight.dirTangent.z);
-    for (int level = 0; level < levels.count; ++level)
-      if (const int source = levels.read(levels.base + level, flight.depth); source >= 0)
-        result.texels[flight.lane].levels[static_cast<std::size_t>(level)] += Vec3d(weight * reflected[source]);
+    passOnLevels(flight.lane, flight.dirTangent, flight.beta, texel, flight.depth);
   }
   void backFace(const Flight& flight) { ++result.texels[flight.lane].backFaces; }
+
+  /// Hands the sums over to the result.
+  void finish() {
+    settle(sums, totals);
+    for (std::size_t lane = 0; lane < coords.size(); ++lane) {
+      const auto map = [&](std::size_t i) {
+        return Vec3d(totals.sum[3 * i][lane], totals.sum[3 * i + 1][lane], totals.sum[3 * i + 2][lane]);
+      };
+      result.texels[lane].flat += map(0);
+      for (std::size_t i = 0; i < 3; ++i) result.texels[lane].rnm[i] += map(i + 1);
+    }
+    totals = {};
+  }
+};
+
+namespace {
+
+/// Sampled light of one kind, collected for all lanes before it is added.
+struct LitLanes {
+  const PointLanes& points;
+  std::uint32_t sample;
+  GatherSink& sink;
+  Vec3Lanes wi{}, light{};
+  std::array<bool, kLanes> lit{};
+  bool any = false;
+
+  void add(std::size_t lane, const Vec3& dirWorld, const Vec3& irradianceOverPi) {
+    if (lit[lane]) flush();  // a second kind of light
+    wi.set(lane, dirWorld);
+    light.set(lane, irradianceOverPi);
+    lit[lane] = any = true;
+  }
+  void flush() {
+    if (!any) return;
+    Vec3Lanes dirTangent;
+    turnToTangent(points.frame, wi, dirTangent);
+    sink.addToMaps(dirTangent, light, [this](std::size_t) { return sample; });
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if (lit[lane] && isFinite(light[lane])) sink.addToLevels(lane, dirTangent[lane], light[lane], 0);
+    light = {};
+    lit = {};
+    any = false;
+  }
 };
 
 }  // namespace
@@ -96,76 +169,55 @@ Vec3 unpackWeight(std::uint32_t packed) {
 }
 
 GatherWave::GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t first, std::size_t count)
-    : scene_(scene), page_(page), first_(first), count_(count) {
-  const PageTexels& texels = scene.texels[page];
+    : scene_(scene),
+      page_(page),
+      first_(first),
+      count_(count),
+      points_(scene.transport.rays, scene.atlas, scene.texels[page], first, count) {
   for (std::size_t lane = 0; lane < count; ++lane) {
-    const TexelCoord at = texels.coords[first + lane];
-    areas_[lane] = footprints_[lane].clip(scene.atlas, texels, first + lane);
+    const TexelCoord at = scene.texels[page].coords[first + lane];
     samplers_[lane] = TexelSampler(scene.seed, page, at.x, at.y);
-    keys_[lane] = samplers_[lane].seed();
+    covered_[lane] = points_.covered(lane);
+    lightSamples_.setTexel(static_cast<int>(lane), samplers_[lane]);
   }
 }
 
-void GatherWave::drawPoints(std::uint32_t first, std::uint32_t count) {
-  pointMask_ = count - 1;
-  for (std::size_t lane = 0; lane < count_; ++lane) {
-    if (!(areas_[lane] > 0)) continue;
-    for (std::uint32_t i = 0; i < count; ++i) {
-      const SurfacePoint point = footprints_[lane].sample(samplers_[lane].get2D(first + i, kFootprint));
-      const Surface& surface = scene_.atlas.surfaces[point.triangle.surface];
-      const std::uint32_t* corner = surface.indices.data() + std::size_t{3} * point.triangle.triangle;
-      const std::array<Vec3, 3> corners = {surface.positions[corner[0]], surface.positions[corner[1]],
-                                           surface.positions[corner[2]]};
-      const Vec3 rayStart = offsetPoint(point.position, point.geometricNormal, corners,
-                                        scene_.transport.rays.translationOf(surface.instance));
-      points_[lane][i] = {{point.position, point.geometricNormal, point.frame.n, rayStart}, point.frame};
-      surfacePoints_[lane][i] = point;
-    }
-  }
-}
-
-Vec3 GatherWave::reflectanceOf(const SurfacePoint& point, float& opacity) const {
-  const Surface& surface = scene_.atlas.surfaces[point.triangle.surface];
+Vec3 GatherWave::reflectanceOf(const PlaceOnTriangle& place, float& opacity) const {
+  const Surface& surface = scene_.atlas.surfaces[place.triangle.surface];
   const Primitive* primitive = scene_.transport.rays.primitiveOf(surface.instance, surface.primitive);
   // The source triangle may be wound the other way round.
-  const std::uint32_t source = surface.sourceTriangle[point.triangle.triangle];
+  const std::uint32_t source = surface.sourceTriangle[place.triangle.triangle];
+  const std::array<float, 3> weights = {1.0f - place.weights.x - place.weights.y, place.weights.x, place.weights.y};
   TrianglePoint at{primitive, source, Vec2(0.0f)};
-  for (int k = 0; k < 3; ++k) {
-    const std::uint32_t vertex =
-        surface.indices[std::size_t{3} * point.triangle.triangle + static_cast<std::size_t>(k)];
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::uint32_t vertex = surface.indices[std::size_t{3} * place.triangle.triangle + k];
     for (int i = 1; i < 3; ++i)
       if (primitive->indices[std::size_t{3} * source + static_cast<std::size_t>(i)] == surface.sourceVertex[vertex])
-        at.barycentric[i - 1] = point.barycentric[k];
+        at.barycentric[i - 1] = weights[k];
   }
   opacity = scene_.transport.materials.opacity(at);
   return scene_.transport.materials.albedo(at);
 }
 
-std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, GatheredWave& counts) {
-  std::array<WarmTexel, kLanes> texels;
-  drawPoints(0, kWarmLights);
-  LightLanes lanes;
-  SampleLanes samples;
-  for (std::size_t lane = 0; lane < count_; ++lane) {
-    lanes.active[lane] = areas_[lane] > 0;
-    samples.setTexel(static_cast<int>(lane), samplers_[lane]);
-    if (!lanes.active[lane]) continue;
-    Vec3 sum(0.0f);
-    float opacities = 0.0f;
-    for (std::uint32_t i = 0; i < kWarmLights; ++i) {
-      float opacity = 0.0f;
-      const Vec3 albedo = reflectanceOf(surfacePoints_[lane][i], opacity);
-      sum += albedo * opacity;
-      opacities += opacity;
-    }
-    if (opacities > 0.0f) texels[lane].reflectance = sum / opacities;
+/// Of the points drawn, by area and where the surface is opaque.
+Vec3 GatherWave::meanReflectance(std::size_t lane) const {
+  Vec3 sum(0.0f);
+  float opacities = 0.0f;
+  for (std::uint32_t i = 0; i < kWarmLights; ++i) {
+    float opacity = 0.0f;
+    const Vec3 albedo = reflectanceOf(points_.place(lane, i), opacity);
+    sum += albedo * opacity;
+    opacities += opacity;
   }
+  return opacities > 0.0f ? sum / opacities : Vec3(0.0f);
+}
+
+void GatherWave::warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts) {
   for (std::uint32_t s = 0; s < kWarmLights; ++s) {
-    for (std::size_t lane = 0; lane < count_; ++lane)
-      if (lanes.active[lane]) lanes.receivers[lane] = pointOf(lane, s).receiver;
-    samples.setSampleOfAll(s);
+    const LightLanes& lanes = points_[s].light;
+    lightSamples_.setSampleOfAll(s);
     counts.shadowRays += directLight(
-        scene_.transport, lanes, samples, 0, scene_.gatherMode,
+        scene_.transport, lanes, lightSamples_, 0, TraceMode::Packet,
         [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
         [&](int lane, const Vec3& wi, const Vec3& light) {
           const auto l = static_cast<std::size_t>(lane);
@@ -173,28 +225,45 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
           if (isFinite(flat)) texels[l].direct += flat / static_cast<float>(kWarmLights);
         });
   }
+}
+
+Flight GatherWave::flightOf(std::size_t lane, std::uint32_t sample, const PointLanes& from,
+                            const AimedRays& rays) const {
+  return {.lane = static_cast<std::uint32_t>(lane),
+          .sample = sample,
+          .key = samplers_[lane].seedOf(kHits),
+          .dirTangent = rays.dirTangent[lane],
+          .beta = Vec3(kInvPi / rays.pdf[lane]),
+          .origin = from.light.receivers[lane].p,
+          .pdf = rays.pdf[lane]};
+}
+
+std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, GatheredWave& counts) {
+  std::array<WarmTexel, kLanes> texels;
+  points_.draw(samplers_, kFootprint, 0, kWarmLights);
+  for (std::size_t lane = 0; lane < count_; ++lane)
+    if (covered_[lane]) texels[lane].reflectance = meanReflectance(lane);
+  warmDirect(texels, counts);
+
   WarmSink sink{texels, links};
   GatherTracer tracer(scene_.transport, scene_.map, scene_.lastDepth, sink);
+  SampleLanes samples = lightSamples_;
+  AimedRays& rays = packets_[0].rays;
   for (std::uint32_t s = 0; s < kWarmRays; ++s) {
-    tracer.clear();
+    const PointLanes& from = points_[s];
+    samples.setSampleOfAll(s);
+    const UnitSquareLanes u = samples.draw2D(kWarmDirection);
+    // By the cosine every ray counts alike, so that no texel passes on more than it receives.
+    aimCosineRays(u.x, u.y, from, rays);
+    scene_.transport.rays.intersect(rays.packet, TraceMode::Packet);
     for (std::size_t lane = 0; lane < count_; ++lane) {
-      if (!lanes.active[lane]) continue;
-      const Point& point = pointOf(lane, s);
-      // By the cosine every ray counts alike, so that no texel passes on more than it receives.
-      const Vec3 local = sampleCosineHemisphere(samplers_[lane].get2D(s, kWarmDirection));
-      const Vec3 dirWorld = point.frame.fromLocal(local);
-      if (!(glm::dot(dirWorld, point.receiver.ng) > 0.0f)) continue;
-      tracer.set(static_cast<int>(lane),
-                 {.lane = static_cast<std::uint32_t>(lane),
-                  .sample = s,
-                  .key = hashCombine(keys_[lane], kWarmHits),
-                  .dirTangent = local,
-                  .beta = Vec3(1.0f),
-                  .origin = point.receiver.p,
-                  .pdf = gatherHemispherePdf(local.z)},
-                 point.receiver.rayStart, dirWorld);
+      if (!rays.packet.valid[lane]) continue;
+      ++counts.rays;
+      Flight flight = flightOf(lane, s, from, rays);
+      flight.key = samplers_[lane].seedOf(kWarmHits);
+      flight.beta = Vec3(1.0f);
+      tracer.arrive(rays.packet, static_cast<int>(lane), flight);
     }
-    tracer.trace(TraceMode::Packet);
   }
   tracer.finish();
   counts.rays += tracer.rays();
@@ -208,68 +277,96 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
 
 GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const Vec3> cache) {
   GatheredWave result;
+  GatherSink sink{scene_, cache, result, page_, std::span(scene_.texels[page_].coords).subspan(first_, count_)};
+  for (std::size_t lane = 0; lane < count_; ++lane)
+    if ((first_ + lane) % PathIntegrator::kProbeStride == 0) sink.probedLane = lane;
   for (std::uint32_t sample = first; sample < end;) {
     const NetRange net = netAt(sample, end);
-    gatherNet(net, cache, result);
+    points_.draw(samplers_, kFootprint, net.first, std::min(WavePoints::kMost, net.count()));
+    gatherLight(net, sink);
+    gatherRays(net, sink);
     sample += net.count();
   }
+  sink.finish();
   return result;
 }
 
-void GatherWave::gatherNet(const NetRange& net, std::span<const Vec3> cache, GatheredWave& result) {
-  drawPoints(net.first, std::min(kMostPoints, net.count()));
-  const PageTexels& page = scene_.texels[page_];
-  GatherSink sink{scene_, cache, result, page_, std::span(page.coords).subspan(first_, count_)};
-  LightLanes lanes;
-  SampleLanes samples;
-  std::array<NetByCell, kLanes> nets;
-  for (std::size_t lane = 0; lane < count_; ++lane) {
-    sink.probed[lane] = (first_ + lane) % PathIntegrator::kProbeStride == 0;
-    lanes.active[lane] = areas_[lane] > 0;
-    samples.setTexel(static_cast<int>(lane), samplers_[lane]);
-    if (lanes.active[lane]) nets[lane].fill(samplers_[lane], net, kDirection);
-  }
-
+/// One light sample per sample and kind of light.
+void GatherWave::gatherLight(const NetRange& net, GatherSink& sink) {
   for (std::uint32_t s = net.first; s < net.first + net.count(); ++s) {
-    for (std::size_t lane = 0; lane < count_; ++lane)
-      if (lanes.active[lane]) lanes.receivers[lane] = pointOf(lane, s).receiver;
-    samples.setSampleOfAll(s);
-    result.shadowRays += directLight(
-        scene_.transport, lanes, samples, 0, scene_.gatherMode,
+    const PointLanes& points = points_[s];
+    LitLanes lit{points, s, sink};
+    lightSamples_.setSampleOfAll(s);
+    sink.result.shadowRays += directLight(
+        scene_.transport, points.light, lightSamples_, 0, TraceMode::Packet,
         [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
         [&](int lane, const Vec3& wi, const Vec3& light) {
-          const auto l = static_cast<std::uint32_t>(lane);
-          sink.add(l, s, pointOf(l, s).frame.toLocal(wi), light * kInvPi, 0);
+          lit.add(static_cast<std::size_t>(lane), wi, light * kInvPi);
         });
+    lit.flush();
+    if ((s & 15u) == 15u) settle(sink.sums, sink.totals);
   }
+}
 
+void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
+  net_.fill(samplers_, covered_, net, kDirection);
   GatherTracer tracer(scene_.transport, scene_.map, scene_.lastDepth, sink);
-  for (std::uint32_t cell = 0; cell < net.count(); ++cell) {
-    tracer.clear();
-    for (std::size_t lane = 0; lane < count_; ++lane) {
-      if (!lanes.active[lane]) continue;
-      const std::uint32_t sample = nets[lane].samples[cell];
-      const Point& point = pointOf(lane, sample);
-      const Vec3 local = sampleGatherHemisphere(nets[lane].points[cell]);
-      const Vec3 dirWorld = point.frame.fromLocal(local);
-      // A bent shading normal gathers from below the surface too, where nothing arrives.
-      if (!(glm::dot(dirWorld, point.receiver.ng) > 0.0f)) continue;
-      const float pdf = gatherHemispherePdf(local.z);
-      tracer.set(static_cast<int>(lane),
-                 {.lane = static_cast<std::uint32_t>(lane),
-                  .sample = sample,
-                  .key = hashCombine(keys_[lane], kHits),
-                  .dirTangent = local,
-                  .beta = Vec3(kInvPi / pdf),
-                  .origin = point.receiver.p,
-                  .pdf = pdf},
-                 point.receiver.rayStart, dirWorld);
+  const std::uint32_t count = net.count();
+  // While one packet is traced, memory is asked for what those before it hit.
+  for (std::uint32_t step = 0; step < count + kInFlight - 1; ++step) {
+    const auto packet = [&](std::uint32_t age) -> Packet& { return packets_[(step - age) % kInFlight]; };
+    const auto inFlight = [&](std::uint32_t age) { return step >= age && step - age < count; };
+    if (inFlight(0)) {
+      packet(0).cell = step;
+      launch(packet(0));
     }
-    tracer.trace(scene_.gatherMode);
+    if (inFlight(1)) scene_.map.findPixels(packet(1).rays.packet, packet(1).lookup);
+    if (inFlight(2)) {
+      scene_.map.findTexels(packet(2).lookup);
+      for (const std::uint32_t texel : packet(2).lookup.texels)
+        if (texel != kNoTexel) sink.prefetch(texel);
+    }
+    if (!inFlight(3)) continue;
+    collect(packet(3), tracer, sink);
+    // Sums of a few samples lose nothing as floats.
+    if ((packet(3).cell & 15u) == 15u) settle(sink.sums, sink.totals);
   }
   tracer.finish();
-  result.rays += tracer.rays();
-  result.shadowRays += tracer.shadowRays();
+  settle(sink.sums, sink.totals);
+  sink.result.rays += tracer.rays();
+  sink.result.shadowRays += tracer.shadowRays();
+}
+
+/// Sends the rays of all lanes into one cell of the net. They share the number of their footprint point too: any 16
+/// neighbouring cells use all points of a texel.
+void GatherWave::launch(Packet& packet) const {
+  aimGatherRays(net_.x(packet.cell), net_.y(packet.cell), points_[packet.cell], packet.rays);
+  scene_.transport.rays.intersect(packet.rays.packet, scene_.gatherMode);
+  scene_.map.findTriangles(packet.rays.packet, packet.lookup);
+}
+
+void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer, GatherSink& sink) const {
+  const AimedRays& rays = packet.rays;
+  const int level = scene_.levels.read(scene_.bounces, 0);
+  const bool shines = scene_.transport.environment.shines();
+  Vec3Lanes light;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!rays.packet.valid[lane]) continue;
+    ++sink.result.rays;
+    const float beta = kInvPi / rays.pdf[lane];
+    const std::uint32_t texel = packet.lookup.texels[lane];
+    if (texel != kNoTexel) {
+      if (level >= 0) light.set(lane, beta * sink.reflectedBy(texel)[level]);
+      sink.passOnLevels(lane, rays.dirTangent[lane], Vec3(beta), texel, 0);
+    } else if (rays.packet.hit(static_cast<int>(lane))) {
+      tracer.arrive(rays.packet, static_cast<int>(lane),
+                    flightOf(lane, net_.sample(packet.cell, lane), points_[packet.cell], rays));
+    } else if (shines) {
+      light.set(lane, beta * tracer.skyTowards(rays.packet.direction(static_cast<int>(lane)), rays.pdf[lane]));
+      if (isFinite(light[lane])) sink.addToLevels(lane, rays.dirTangent[lane], light[lane], 0);
+    }
+  }
+  sink.addToMaps(rays.dirTangent, light, [&](std::size_t lane) { return net_.sample(packet.cell, lane); });
 }
 
 }  // namespace lumel

@@ -7,9 +7,11 @@
 #include <span>
 #include <vector>
 
+#include "baker/gather_kernels.h"
 #include "baker/gather_tracer.h"
 #include "baker/path_integrator.h"
 #include "baker/stratified_net.h"
+#include "baker/wave_points.h"
 #include "lightmap/projection.h"
 
 namespace lumel {
@@ -78,6 +80,8 @@ struct WarmTexel {
   std::uint32_t backFaces = 0;
 };
 
+struct GatherSink;
+
 class GatherWave {
  public:
   static constexpr int kWarmRays = 8;
@@ -87,7 +91,7 @@ class GatherWave {
   GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t first, std::size_t count);
 
   /// Share of the texel's area that is covered, 0..1.
-  float coverage(std::size_t lane) const { return static_cast<float>(std::min(areas_[lane], 1.0)); }
+  float coverage(std::size_t lane) const { return static_cast<float>(std::min(points_.area(lane), 1.0)); }
 
   /// `links`: kWarmRays per texel of the wave.
   std::array<WarmTexel, kLanes> warmUp(std::span<CacheLink> links, GatheredWave& counts);
@@ -97,29 +101,32 @@ class GatherWave {
   GatheredWave gather(std::uint32_t first, std::uint32_t end, std::span<const Vec3> cache);
 
  private:
-  struct Point {
-    Receiver receiver;
-    Frame frame;
+  Vec3 meanReflectance(std::size_t lane) const;
+  Vec3 reflectanceOf(const PlaceOnTriangle& place, float& opacity) const;
+  void warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts);
+  Flight flightOf(std::size_t lane, std::uint32_t sample, const PointLanes& from, const AimedRays& rays) const;
+  void gatherLight(const NetRange& net, GatherSink& sink);
+  void gatherRays(const NetRange& net, GatherSink& sink);
+  /// A packet of gather rays, from its start to where the light of its texels is known.
+  struct Packet {
+    std::uint32_t cell = 0;  // of the net
+    AimedRays rays;
+    TexelMap::Lookup lookup;
   };
-  static constexpr std::uint32_t kMostPoints = 16;
-
-  /// Draws `count` points of every texel, a power of two.
-  void drawPoints(std::uint32_t first, std::uint32_t count);
-  const Point& pointOf(std::size_t lane, std::uint32_t sample) const { return points_[lane][sample & pointMask_]; }
-  Vec3 reflectanceOf(const SurfacePoint& point, float& opacity) const;
-  void gatherNet(const NetRange& net, std::span<const Vec3> cache, GatheredWave& result);
+  void launch(Packet& packet) const;
+  void collect(const Packet& packet, GatherTracer<GatherSink>& tracer, GatherSink& sink) const;
 
   const GatherScene& scene_;
   std::uint32_t page_;
   std::size_t first_;
   std::size_t count_;
-  std::array<TexelFootprint, kLanes> footprints_;
-  std::array<double, kLanes> areas_{};
+  WavePoints points_;
   std::array<TexelSampler, kLanes> samplers_;
-  std::array<std::uint32_t, kLanes> keys_{};
-  std::array<std::array<Point, kMostPoints>, kLanes> points_;
-  std::array<std::array<SurfacePoint, kMostPoints>, kLanes> surfacePoints_;
-  std::uint32_t pointMask_ = 0;
+  std::array<bool, kLanes> covered_{};
+  SampleLanes lightSamples_;
+  NetLanes net_;
+  static constexpr std::uint32_t kInFlight = 4;
+  std::array<Packet, kInFlight> packets_;
 };
 
 }  // namespace lumel

@@ -4,6 +4,7 @@
 
 #include "baker/direct_light.h"
 #include "baker/sampling.h"
+#include "baker/stratified_net.h"
 
 namespace lumel {
 namespace {
@@ -65,8 +66,9 @@ class WaveTracer {
   std::array<bool, kLanes> covered_{};
   LightLanes lanes_;  // receivers of the light that is sampled next
   std::array<Path, kLanes> paths_;
+  std::array<TexelSampler, kLanes> samplers_;
   SampleLanes samples_;
-  StratumOrder order_;
+  NetLanes net_;
   RayPacket rays_;
   std::array<HitSurface, kLanes> hits_;
   WaveResult result_;
@@ -75,17 +77,18 @@ class WaveTracer {
 WaveResult WaveTracer::run(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count) {
   startTexels(pageIndex, page, first, count);
   const auto samples = static_cast<std::uint32_t>(options_.samples);
-  for (std::uint32_t block = 0; block < samples; block += StratumOrder::kBlock) {
-    const std::uint32_t size = std::min(StratumOrder::kBlock, samples - block);
-    if (options_.stratumOrder) order_.arrange(samples_, kDirection, block, size);
-    for (std::uint32_t step = 0; step < size; ++step) {
-      for (int lane = 0; lane < kLanes; ++lane)
-        samples_.setSample(lane, options_.stratumOrder ? order_.sample(step, lane) : block + step);
+  for (std::uint32_t begin = 0; begin < samples;) {
+    const NetRange range = netAt(begin, samples);
+    if (options_.stratumOrder) net_.fill(samplers_, covered_, range, kDirection);
+    for (std::uint32_t step = 0; step < range.count(); ++step) {
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        samples_.setSample(static_cast<int>(lane), options_.stratumOrder ? net_.sample(step, lane) : begin + step);
       startSample();
       lightTexels();
       followPaths();
       finishSample();
     }
+    begin += range.count();
   }
   return std::move(result_);
 }
@@ -99,7 +102,8 @@ void WaveTracer::startTexels(std::uint32_t pageIndex, const PageTexels& page, st
     texel.coverage = static_cast<float>(std::min(area, 1.0));
     texel.probed = (first + lane) % PathIntegrator::kProbeStride == 0;
     covered_[lane] = area > 0.0;
-    samples_.setTexel(static_cast<int>(lane), TexelSampler(options_.seed, pageIndex, coords_[lane].x, coords_[lane].y));
+    samplers_[lane] = TexelSampler(options_.seed, pageIndex, coords_[lane].x, coords_[lane].y);
+    samples_.setTexel(static_cast<int>(lane), samplers_[lane]);
   }
 }
 

@@ -18,7 +18,7 @@ struct PathOptions {
   int samples = 1;
   int bounces = 0;
   std::uint64_t seed = 1;
-  bool stratumOrder = true;                  // take samples in StratumOrder: the same samples, faster rays
+  bool stratumOrder = true;                  // take samples by cell (NetLanes): the same samples, faster rays
   TraceMode gatherMode = TraceMode::Packet;  // rays and shadow rays from texels
   TraceMode bounceMode = TraceMode::Packet;  // those from hits
 };

@@ -38,6 +38,15 @@ float rayHash(RTCRayN* ray, unsigned int rays, unsigned int lane, std::uint32_t 
   return unitFloat(h);
 }
 
+/// What is the same for all rays.
+void initRays(RTCRay16& ray) {
+  std::fill(std::begin(ray.tnear), std::end(ray.tnear), 0.0f);
+  std::fill(std::begin(ray.time), std::end(ray.time), 0.0f);
+  std::fill(std::begin(ray.mask), std::end(ray.mask), 0xffffffffu);
+  std::fill(std::begin(ray.id), std::end(ray.id), 0u);
+  std::fill(std::begin(ray.flags), std::end(ray.flags), 0u);
+}
+
 void setRay(RTCRay16& ray, int lane, const Vec3& origin, const Vec3& dir, float length) {
   ray.org_x[lane] = origin.x;
   ray.org_y[lane] = origin.y;
@@ -45,15 +54,15 @@ void setRay(RTCRay16& ray, int lane, const Vec3& origin, const Vec3& dir, float 
   ray.dir_x[lane] = dir.x;
   ray.dir_y[lane] = dir.y;
   ray.dir_z[lane] = dir.z;
-  ray.tnear[lane] = 0.0f;
   ray.tfar[lane] = length;
-  ray.time[lane] = 0.0f;
-  ray.mask[lane] = 0xffffffffu;
-  ray.id[lane] = 0;
-  ray.flags[lane] = 0;
 }
 
 }  // namespace
+
+RayPacket::RayPacket() {
+  initRays(rayhit.ray);
+  clear();
+}
 
 void RayPacket::clear() { std::fill(std::begin(valid), std::end(valid), 0); }
 
@@ -62,6 +71,11 @@ void RayPacket::set(int lane, const Vec3& origin, const Vec3& dir) {
   rayhit.hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
   rayhit.hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
   valid[lane] = -1;
+}
+
+ShadowPacket::ShadowPacket() {
+  initRays(ray);
+  clear();
 }
 
 void ShadowPacket::clear() {
@@ -199,6 +213,7 @@ void RayScene::alphaFilter(const RTCFilterFunctionNArguments* args) {
 
 void RayScene::intersect(RayPacket& rays, TraceMode mode) const {
   RTCIntersectContext context = newContext();
+  if (mode == TraceMode::Coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   if (mode != TraceMode::Single) {
     rtcIntersect16(rays.valid, top_.get(), &context, &rays.rayhit);
     return;
@@ -221,6 +236,7 @@ void RayScene::intersect(RayPacket& rays, TraceMode mode) const {
 
 void RayScene::occluded(ShadowPacket& rays, TraceMode mode) const {
   if (!rays.any) return;
+  LUMEL_CHECK(mode != TraceMode::Coherent);
   RTCIntersectContext context = newContext();
   if (mode != TraceMode::Single) {
     rtcOccluded16(rays.valid, top_.get(), &context, &rays.ray);

@@ -16,12 +16,16 @@
 
 namespace lumel {
 
-/// How a packet is traced. Packet answers like Single but for ties and rounding: a bake uses one throughout.
-/// Embree's flag for coherent rays is not offered: with ROBUST and AVX-512, Embree 3.13's rtcOccluded16 never returns
-/// for some packets that are coherent in name only (one ray with a direction component of -1e-16 is enough).
+/// How a packet is traced. All answer alike but for ties and rounding: a bake uses one throughout for the same rays.
+/// Coherent is Embree's flag for rays that run close together, for closest hits alone: with ROBUST and AVX-512,
+/// Embree 3.13's rtcOccluded16 never returned for some packets that are coherent in name only (one ray with a direction
+/// component of -1e-16 was enough). rtcIntersect16 with the flag returns, but misses what it should hit where
+/// components are below 1e-18, whose reciprocals Embree replaces by positive ones; where all are above, 26 million
+/// packets of extreme directions gave the same hits as without it.
 enum class TraceMode {
-  Single,  // one call per ray: the plain way, kept as the yardstick
-  Packet,  // 16 rays per call
+  Single,    // one call per ray: the plain way, kept as the yardstick
+  Packet,    // 16 rays per call
+  Coherent,  // the same, for closest hits of rays that run close together; no component nearer to zero than 1e-12
 };
 
 /// Up to 16 rays that look for their closest hit. Lanes that are not set are not traced.
@@ -29,9 +33,11 @@ struct alignas(64) RayPacket {
   RTCRayHit16 rayhit;
   alignas(64) int valid[kLanes];
 
-  RayPacket() { clear(); }
+  /// No lane is set; what is the same for all rays is.
+  RayPacket();
   void clear();
   void set(int lane, const Vec3& origin, const Vec3& dir);
+  Vec3 direction(int lane) const { return {rayhit.ray.dir_x[lane], rayhit.ray.dir_y[lane], rayhit.ray.dir_z[lane]}; }
   bool hit(int lane) const { return valid[lane] != 0 && rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID; }
 };
 
@@ -41,7 +47,7 @@ struct alignas(64) ShadowPacket {
   alignas(64) int valid[kLanes];
   bool any = false;
 
-  ShadowPacket() { clear(); }
+  ShadowPacket();
   void clear();
   /// `length` in units of |dir|.
   void set(int lane, const Vec3& origin, const Vec3& dir, float length);
@@ -81,16 +87,19 @@ inline float offsetDistance(const std::array<Vec3, 3>& corners, float translatio
          (std::max(std::max(largest.x, largest.y), largest.z) + translation);
 }
 
+/// The move that offsetPoint makes; `inwards`: the sum of the vectors to the triangle's corners.
+inline Vec3 rayOffset(const Vec3& ng, const Vec3& inwards, float distance) {
+  const float reach = glm::length(inwards);
+  // At most half the way to the centroid, which lies at inwards / 3.
+  const float share = reach > 6.0f * distance ? distance / reach : 1.0f / 6.0f;
+  return ng * distance + inwards * share;
+}
+
 /// The start of a ray that leaves p, a point of the triangle, on the side of ng. It is moved by offsetDistance along
 /// the normal, so that rounding cannot put it behind the surface, and as far towards the triangle's centroid, so that
 /// it cannot lie beyond a wall that stands on the triangle's edge.
 inline Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const std::array<Vec3, 3>& corners, float translation) {
-  const float distance = offsetDistance(corners, translation);
-  const Vec3 inwards = (corners[0] - p) + (corners[1] - p) + (corners[2] - p);
-  const float reach = glm::length(inwards);
-  // At most half the way to the centroid, which lies at inwards / 3.
-  const float share = reach > 6.0f * distance ? distance / reach : 1.0f / 6.0f;
-  return p + (ng * distance + inwards * share);
+  return p + rayOffset(ng, (corners[0] - p) + (corners[1] - p) + (corners[2] - p), offsetDistance(corners, translation));
 }
 
 class RayScene {
@@ -100,6 +109,7 @@ class RayScene {
   static Expected<std::unique_ptr<RayScene>> build(const Scene& scene, const Materials& materials);
 
   void intersect(RayPacket& rays, TraceMode mode) const;
+  /// Precondition: mode is not Coherent.
   void occluded(ShadowPacket& rays, TraceMode mode) const;
 
   /// Precondition: rays.hit(lane).
@@ -130,6 +140,13 @@ class RayScene {
   Vec3 boundsMin() const { return boundsMin_; }
   Vec3 boundsMax() const { return boundsMax_; }
   bool empty() const { return parts_.empty(); }
+  /// Whether TraceMode::Coherent may be used: in the space of an instance that Embree places, a direction may have
+  /// any components.
+  bool allowsCoherent() const {
+    return std::none_of(meshScenes_.begin(), meshScenes_.end(), [](const EmbreeScene& s) { return s != nullptr; });
+  }
+  /// For benchmarks that call Embree themselves.
+  RTCScene embreeScene() const { return top_.get(); }
   std::size_t alphaTestedParts() const { return alphaTested_.size(); }
 
  private:

@@ -1,16 +1,13 @@
-// The sample patterns of a wave of texels, drawn for all lanes at once, and the order in which a wave takes them.
+// The sample patterns of a wave of texels, drawn for all lanes at once.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <vector>
 
+#include "baker/lanes.h"
 #include "baker/sobol.h"
 
 namespace lumel {
-
-/// Texels that advance in step: one lane each, one packet per ray call.
-inline constexpr int kLanes = 16;
 
 struct UnitLanes {
   alignas(64) float u[kLanes];
@@ -39,26 +36,6 @@ class SampleLanes {
  private:
   alignas(64) std::uint32_t seeds_[kLanes] = {};
   alignas(64) std::uint32_t samples_[kLanes] = {};
-};
-
-/// The order in which the lanes take their samples: at every step all lanes take a point of `pattern` from the same
-/// cell of the unit square, cells in Morton order, so that the rays of a packet run close together and yet are
-/// independent. Each lane takes every sample of a block exactly once. With 4^k samples in a block a (0, 2k, 2)-net has
-/// exactly one point in each of 4^k cells.
-class StratumOrder {
- public:
-  /// Orders samples [first, first + count), count <= kBlock.
-  void arrange(SampleLanes lanes, std::uint32_t pattern, std::uint32_t first, std::uint32_t count);
-  std::uint32_t sample(std::uint32_t step, int lane) const {
-    return first_ + order_[step * kLanes + static_cast<std::uint32_t>(lane)];
-  }
-
-  static constexpr std::uint32_t kBlock = 1024;
-
- private:
-  std::uint32_t first_ = 0;
-  std::vector<std::uint16_t> order_;  // [step][lane]
-  std::vector<std::uint16_t> cells_;  // [sample][lane]
 };
 
 }  // namespace lumel

@@ -19,11 +19,7 @@ struct RawNet {
   std::array<std::uint32_t, kMostNetPoints> cell;
 };
 
-// Integer work and exact conversions, so that every version of it gives the same bits.
-#if defined(__x86_64__) && defined(__ELF__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-__attribute__((target_clones("avx512f", "avx2", "default")))
-#endif
-void drawNet(std::uint32_t seed, std::uint32_t first, std::uint32_t count, int bitsX, int bitsY, RawNet& net) {
+LUMEL_FOR_EACH_CPU void drawNet(std::uint32_t seed, std::uint32_t first, std::uint32_t count, int bitsX, int bitsY, RawNet& net) {
   const auto cellsX = static_cast<float>(1 << bitsX);
   const auto cellsY = static_cast<float>(1 << bitsY);
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -37,12 +33,25 @@ void drawNet(std::uint32_t seed, std::uint32_t first, std::uint32_t count, int b
 
 }  // namespace
 
-void NetByCell::fill(const TexelSampler& sampler, const NetRange& net, std::uint32_t pattern) {
+void NetLanes::fill(const std::array<TexelSampler, kLanes>& samplers, const std::array<bool, kLanes>& active,
+                    const NetRange& net, std::uint32_t pattern) {
+  first_ = net.first;
   RawNet raw;
-  drawNet(sampler.seedOf(pattern), net.first, net.count(), (net.log2Count + 1) / 2, net.log2Count / 2, raw);
-  for (std::uint32_t i = 0; i < net.count(); ++i) {
-    points[raw.cell[i]] = {raw.x[i], raw.y[i]};
-    samples[raw.cell[i]] = net.first + i;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!active[lane]) {
+      for (std::size_t at = lane; at < std::size_t{net.count()} * kLanes; at += kLanes) {
+        x_[at] = y_[at] = 0.0f;
+        offset_[at] = 0;
+      }
+      continue;
+    }
+    drawNet(samplers[lane].seedOf(pattern), net.first, net.count(), (net.log2Count + 1) / 2, net.log2Count / 2, raw);
+    for (std::uint32_t i = 0; i < net.count(); ++i) {
+      const std::size_t at = std::size_t{raw.cell[i]} * kLanes + lane;
+      x_[at] = raw.x[i];
+      y_[at] = raw.y[i];
+      offset_[at] = static_cast<std::uint16_t>(i);
+    }
   }
 }
 

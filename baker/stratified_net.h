@@ -8,12 +8,13 @@
 #include <bit>
 #include <cstdint>
 
+#include "baker/lanes.h"
 #include "baker/sobol.h"
 
 namespace lumel {
 
-/// Most points of one net: 16 x 16 cells.
-inline constexpr int kMostNetPoints = 256;
+/// Most points of one net: 32 x 32 cells.
+inline constexpr std::uint32_t kMostNetPoints = 1024;
 
 /// An aligned stretch of a sequence: 2^log2Count samples from `first`, a multiple of their number.
 struct NetRange {
@@ -24,18 +25,32 @@ struct NetRange {
 
 /// The largest net that starts at `first` and does not go past `end`. Precondition: first < end.
 inline NetRange netAt(std::uint32_t first, std::uint32_t end) {
-  int log2Count = std::bit_width(std::min<std::uint32_t>(end - first, kMostNetPoints)) - 1;
+  int log2Count = std::bit_width(std::min(end - first, kMostNetPoints)) - 1;
   if (first != 0) log2Count = std::min(log2Count, std::countr_zero(first));
   return {first, log2Count};
 }
 
-/// One texel's points of a net by cell. An aligned block of 2^m points of a (0, 2)-sequence is a (0, m, 2)-net: each
-/// of 2^ceil(m/2) x 2^floor(m/2) cells holds exactly one of them (Niederreiter 1987; Owen scrambling keeps this).
-struct NetByCell {
-  std::array<Vec2, kMostNetPoints> points;
-  std::array<std::uint32_t, kMostNetPoints> samples;  // index in the sequence
+/// The points of a net by cell, for every lane of a wave. An aligned block of 2^m points of a (0, 2)-sequence is a
+/// (0, m, 2)-net: each of 2^ceil(m/2) x 2^floor(m/2) cells holds exactly one of them (Niederreiter 1987; Owen
+/// scrambling keeps this). Cells are in Morton order, so that one packet's rays are close to those of the next.
+class NetLanes {
+ public:
+  /// The points of `pattern`. Lanes that are not `active` hold zeros.
+  void fill(const std::array<TexelSampler, kLanes>& samplers, const std::array<bool, kLanes>& active,
+            const NetRange& net, std::uint32_t pattern);
 
-  void fill(const TexelSampler& sampler, const NetRange& net, std::uint32_t pattern);
+  /// kLanes values: the lanes' points in a cell.
+  const float* x(std::uint32_t cell) const { return x_.data() + std::size_t{cell} * kLanes; }
+  const float* y(std::uint32_t cell) const { return y_.data() + std::size_t{cell} * kLanes; }
+  /// Index in the sequence.
+  std::uint32_t sample(std::uint32_t cell, std::size_t lane) const { return first_ + offset_[cell * kLanes + lane]; }
+
+ private:
+  std::uint32_t first_ = 0;
+  // [cell][lane]; only what the net at hand needs is ever touched
+  alignas(64) std::array<float, std::size_t{kMostNetPoints} * kLanes> x_;
+  alignas(64) std::array<float, std::size_t{kMostNetPoints} * kLanes> y_;
+  std::array<std::uint16_t, std::size_t{kMostNetPoints} * kLanes> offset_;
 };
 
 }  // namespace lumel

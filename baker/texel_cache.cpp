@@ -12,7 +12,7 @@
 namespace lumel {
 
 TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<PageTexels>& texels)
-    : atlas_(atlas), texels_(texels) {
+    : rays_(rays), atlas_(atlas), texels_(texels) {
   firstOfPage_.push_back(0);
   std::size_t count = 0;
   std::size_t pixels = 0;
@@ -31,7 +31,7 @@ TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<P
           firstOfPage_[p] + static_cast<std::uint32_t>(i);
     }
 
-  firstOfPart_.assign(rays.parts().size(), -1);
+  for (const ScenePart& part : rays.parts()) parts_.push_back({.shines = part.firstEmitter >= 0});
   // Instances and primitives number surfaces; parts leave out what rays cannot hit.
   std::map<std::pair<int, const Primitive*>, std::uint32_t> partOf;
   for (std::uint32_t p = 0; p < rays.parts().size(); ++p)
@@ -39,29 +39,29 @@ TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<P
   for (const Surface& surface : atlas.surfaces)
     if (const auto found = partOf.find({surface.instance, rays.primitiveOf(surface.instance, surface.primitive)});
         found != partOf.end())
-      addSurface(rays, found->second, surface);
+      addSurface(found->second, surface);
 }
 
-void TexelMap::addSurface(const RayScene& rays, std::uint32_t part, const Surface& surface) {
-  const ScenePart& source = rays.parts()[part];
-  if (firstOfPart_[part] < 0) {
-    firstOfPart_[part] = static_cast<std::int64_t>(triangles_.size());
+void TexelMap::addSurface(std::uint32_t part, const Surface& surface) {
+  const ScenePart& source = rays_.parts()[part];
+  std::int64_t& first = parts_[part].firstTriangle;
+  if (first < 0) {
+    first = static_cast<std::int64_t>(triangles_.size());
     triangles_.resize(triangles_.size() + source.primitive->triangleCount());
   }
   const PageMap& page = pages_[static_cast<std::size_t>(surface.page)];
   for (std::size_t t = 0; t < surface.triangleCount(); ++t) {
     const std::uint32_t sourceTriangle = surface.sourceTriangle[t];
-    Triangle& triangle = triangles_[static_cast<std::size_t>(firstOfPart_[part]) + sourceTriangle];
     const std::uint32_t* sourceCorner = source.primitive->indices.data() + std::size_t{3} * sourceTriangle;
+    std::array<Vec2, 3> pixels{};  // of the source triangle's corners, which may be wound the other way round
     for (std::size_t i = 0; i < 3; ++i)
       for (std::size_t k = 0; k < 3; ++k) {
         const std::uint32_t vertex = surface.indices[3 * t + k];
         if (surface.sourceVertex[vertex] == sourceCorner[i])
-          triangle.pixels[i] = surface.lightmapUvs[vertex] * Vec2(page.width, page.height);
+          pixels[i] = surface.lightmapUvs[vertex] * Vec2(page.width, page.height);
       }
-    const std::array<Vec3, 3> corner = rays.corners(source, sourceTriangle);
-    triangle.frontNormal = glm::normalize(glm::cross(corner[1] - corner[0], corner[2] - corner[0])) * source.frontSign;
-    triangle.page = static_cast<std::uint32_t>(surface.page);
+    triangles_[static_cast<std::size_t>(first) + sourceTriangle] = {
+        pixels[0], pixels[1] - pixels[0], pixels[2] - pixels[0], static_cast<std::uint32_t>(surface.page)};
   }
 }
 
@@ -77,24 +77,75 @@ std::uint32_t TexelMap::at(const PageMap& page, int x, int y) const {
                  static_cast<std::size_t>(x)];
 }
 
-std::uint32_t TexelMap::find(std::uint32_t part, std::uint32_t triangleIndex, Vec2 barycentric,
-                             const Vec3& dirWorld) const {
-  const std::int64_t first = firstOfPart_[part];
-  if (first < 0) return kNoTexel;
-  const Triangle& triangle = triangles_[static_cast<std::size_t>(first) + triangleIndex];
-  if (triangle.page == kNoTexel || glm::dot(dirWorld, triangle.frontNormal) > 0.0f) return kNoTexel;
-  const PageMap& page = pages_[triangle.page];
-  const Vec2 pixel = (1.0f - barycentric.x - barycentric.y) * triangle.pixels[0] + barycentric.x * triangle.pixels[1] +
-                     barycentric.y * triangle.pixels[2];
+bool TexelMap::fromBehind(std::uint32_t part, const RayPacket& packet, int lane) const {
+  const RTCHit16& hit = packet.rayhit.hit;
+  const ScenePart& source = rays_.parts()[part];
+  const Vec3 ng(hit.Ng_x[lane], hit.Ng_y[lane], hit.Ng_z[lane]);
+  // Embree gives the normal in the space that its triangles are in.
+  const Vec3 front = source.worldPositions ? ng * source.frontSign : source.worldFromNormal * ng;
+  return glm::dot(packet.direction(lane), front) > 0.0f;
+}
+
+/// A point on a chart's border may round to the texel beside it.
+std::uint32_t TexelMap::texelBeside(const PageMap& page, const Vec2& pixel) const {
   const int x = static_cast<int>(std::floor(pixel.x));
   const int y = static_cast<int>(std::floor(pixel.y));
-  if (const std::uint32_t texel = at(page, x, y); texel != kNoTexel) return texel;
-  // A point on a chart's border may round to the texel beside it.
   const int sideX = pixel.x - static_cast<float>(x) < 0.5f ? -1 : 1;
   const int sideY = pixel.y - static_cast<float>(y) < 0.5f ? -1 : 1;
   for (const auto& [dx, dy] : {std::pair(sideX, 0), std::pair(0, sideY), std::pair(sideX, sideY)})
     if (const std::uint32_t texel = at(page, x + dx, y + dy); texel != kNoTexel) return texel;
   return kNoTexel;
+}
+
+std::uint32_t TexelMap::find(std::uint32_t part, const RayPacket& packet, int lane) const {
+  const std::int64_t first = parts_[part].firstTriangle;
+  if (first < 0 || fromBehind(part, packet, lane)) return kNoTexel;
+  const RTCHit16& hit = packet.rayhit.hit;
+  const Triangle& triangle = triangles_[static_cast<std::size_t>(first) + hit.primID[lane]];
+  if (triangle.page == kNoTexel) return kNoTexel;
+  const PageMap& page = pages_[triangle.page];
+  const Vec2 pixel = triangle.at(hit.u[lane], hit.v[lane]);
+  const std::uint32_t texel = at(page, static_cast<int>(std::floor(pixel.x)), static_cast<int>(std::floor(pixel.y)));
+  return texel != kNoTexel ? texel : texelBeside(page, pixel);
+}
+
+void TexelMap::findTriangles(const RayPacket& packet, Lookup& lookup) const {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    lookup.triangles[lane] = nullptr;
+    if (!packet.hit(static_cast<int>(lane))) continue;
+    const std::uint32_t part = rays_.partOf(packet, static_cast<int>(lane));
+    const PartMap& map = parts_[part];
+    if (map.shines || map.firstTriangle < 0 || fromBehind(part, packet, static_cast<int>(lane))) continue;
+    lookup.triangles[lane] =
+        &triangles_[static_cast<std::size_t>(map.firstTriangle) + packet.rayhit.hit.primID[lane]];
+    __builtin_prefetch(lookup.triangles[lane]);
+  }
+}
+
+void TexelMap::findPixels(const RayPacket& packet, Lookup& lookup) const {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Triangle* triangle = lookup.triangles[lane];
+    lookup.pixels[lane] = nullptr;
+    if (!triangle || triangle->page == kNoTexel) continue;
+    const PageMap& page = pages_[triangle->page];
+    lookup.places[lane] = triangle->at(packet.rayhit.hit.u[lane], packet.rayhit.hit.v[lane]);
+    // Rounding may lead over the page's border.
+    const int x = std::clamp(static_cast<int>(lookup.places[lane].x), 0, page.width - 1);
+    const int y = std::clamp(static_cast<int>(lookup.places[lane].y), 0, page.height - 1);
+    lookup.pixels[lane] = pixels_.data() + page.first +
+                          static_cast<std::size_t>(y) * static_cast<std::size_t>(page.width) +
+                          static_cast<std::size_t>(x);
+    __builtin_prefetch(lookup.pixels[lane]);
+  }
+}
+
+void TexelMap::findTexels(Lookup& lookup) const {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const std::uint32_t* pixel = lookup.pixels[lane];
+    lookup.texels[lane] = pixel ? *pixel : kNoTexel;
+    if (pixel && *pixel == kNoTexel)
+      lookup.texels[lane] = texelBeside(pages_[lookup.triangles[lane]->page], lookup.places[lane]);
+  }
 }
 
 std::uint32_t TexelMap::chartOf(const PageTexels& page, std::size_t texel) const {

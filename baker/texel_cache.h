@@ -2,6 +2,7 @@
 // reflects.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -17,17 +18,25 @@ inline constexpr std::uint32_t kNoTexel = 0xffffffffu;
 /// Covered texels of all pages are numbered through: page by page, in the order of PageTexels.
 class TexelMap {
  public:
-  /// Keeps references to `atlas` and `texels`. Memory: 4 bytes per pixel of every page, 48 per triangle of a part that
-  /// has a lightmap.
+  /// Keeps references to its arguments. Memory: 4 bytes per pixel of every page, 32 per triangle of a part that has a
+  /// lightmap.
   TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<PageTexels>& texels);
 
   std::size_t size() const { return firstOfPage_.back(); }
   std::uint32_t firstOfPage(std::size_t page) const { return firstOfPage_[page]; }
   std::size_t pageOf(std::uint32_t texel) const;
 
-  /// The texel that holds the light of a point of a triangle of RayScene::parts()[part], or kNoTexel: the part has no
-  /// lightmap, `dirWorld` travels towards its back, or the point lies (by rounding) beside all texels of the page.
-  std::uint32_t find(std::uint32_t part, std::uint32_t triangle, Vec2 barycentric, const Vec3& dirWorld) const;
+  /// The texel that holds the light at a ray's hit on RayScene::parts()[part], or kNoTexel: the part has no lightmap,
+  /// its back was hit, or the point lies (by rounding) beside all texels of the page. Precondition: packet.hit(lane).
+  std::uint32_t find(std::uint32_t part, const RayPacket& packet, int lane) const;
+
+  /// The same for all lanes of a packet, in three steps: each asks memory for what the next one reads, so that a caller
+  /// can do other work in between. The result is `texels`: kNoTexel also where nothing was hit, or something that
+  /// shines by itself.
+  struct Lookup;
+  void findTriangles(const RayPacket& packet, Lookup& lookup) const;
+  void findPixels(const RayPacket& packet, Lookup& lookup) const;
+  void findTexels(Lookup& lookup) const;
 
   /// For each texel that is not `valid`: the nearest valid one of the same chart, within kReach texels; pairs of
   /// (texel, source) in the order of texels. Texels without such a neighbour are left out.
@@ -39,28 +48,46 @@ class TexelMap {
   static constexpr int kReach = 16;
 
  private:
-  struct Triangle {
-    Vec2 pixels[3]{};               // of the source triangle's corners on the page
-    Vec3 frontNormal{0};            // world
-    std::uint32_t page = kNoTexel;  // kNoTexel: no lightmap
+  struct alignas(32) Triangle {
+    Vec2 pixel{0}, perU{0}, perV{0};  // on the page: of the first corner, and how it moves with the barycentrics
+    std::uint32_t page = kNoTexel;    // kNoTexel: no lightmap
+
+    Vec2 at(float u, float v) const { return pixel + u * perU + v * perV; }
+  };
+  struct PartMap {
+    std::int64_t firstTriangle = -1;  // into triangles_; -1: no lightmap
+    bool shines = false;
   };
   struct PageMap {
     int width = 0;
     int height = 0;
     std::size_t first = 0;  // into pixels_
   };
-  void addSurface(const RayScene& rays, std::uint32_t part, const Surface& surface);
+  void addSurface(std::uint32_t part, const Surface& surface);
+  bool fromBehind(std::uint32_t part, const RayPacket& packet, int lane) const;
+  std::uint32_t texelBeside(const PageMap& page, const Vec2& pixel) const;
   std::uint32_t at(const PageMap& page, int x, int y) const;
   std::uint32_t chartOf(const PageTexels& page, std::size_t texel) const;
   std::uint32_t nearestValid(std::size_t page, std::size_t texel, std::span<const std::uint8_t> valid) const;
 
+  const RayScene& rays_;
   const Atlas& atlas_;
   const std::vector<PageTexels>& texels_;
   std::vector<std::uint32_t> firstOfPage_;  // [pages + 1]
   std::vector<PageMap> pages_;
   std::vector<std::uint32_t> pixels_;      // per pixel of every page: its texel or kNoTexel
-  std::vector<std::int64_t> firstOfPart_;  // per part: into triangles_; -1: no lightmap
+  std::vector<PartMap> parts_;
   std::vector<Triangle> triangles_;
+};
+
+struct TexelMap::Lookup {
+  std::array<std::uint32_t, kLanes> texels;
+
+ private:
+  friend TexelMap;
+  std::array<const Triangle*, kLanes> triangles;
+  std::array<const std::uint32_t*, kLanes> pixels;
+  std::array<Vec2, kLanes> places;
 };
 
 }  // namespace lumel

@@ -23,6 +23,8 @@ class RnmKernels {
  public:
   explicit RnmKernels(Projection projection);
   Vec3 operator()(const Vec3& dirTangent) const;
+  /// Whether the kernels are max(0, w.B_i) above the surface, so that a caller may compute them in place.
+  bool clampedDots() const { return projection_ != Projection::Fit; }
 
   /// An upper bound of every kernel over the hemisphere (for sampling densities and for tests).
   float bound() const { return bound_; }

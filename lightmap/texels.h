@@ -53,6 +53,18 @@ struct SurfacePoint {
 /// be sampled uniformly by area. Reused between texels to save allocation.
 class TexelFootprint {
  public:
+  struct Source {  // a triangle of the texel
+    TriangleRef triangle;
+    std::array<std::uint32_t, 3> vertices;
+    Vec3 geometricNormal;
+  };
+  struct Piece {
+    std::uint32_t source = 0;         // into sources()
+    std::array<Vec2, 3> barycentric;  // of the piece's corners: weights of vertices 1 and 2
+    double areaBefore = 0.0;          // summed area of the pieces before this one
+    double area = 0.0;
+  };
+
   /// Clips (Sutherland and Hodgman 1974) in double precision. Returns the covered area in texels, 0..1 (more than 1
   /// where scene UVs overlap); 0: nothing to sample.
   double clip(const Atlas& atlas, const PageTexels& page, std::size_t texel);
@@ -67,18 +79,11 @@ class TexelFootprint {
   /// point for single-ray work and for reports.
   SurfacePoint centroid() const;
 
+  /// What sample() chooses from, for callers that draw many points.
+  std::span<const Source> sources() const { return sources_; }
+  std::span<const Piece> pieces() const { return pieces_; }
+
  private:
-  struct Source {  // a triangle of the texel
-    TriangleRef triangle;
-    std::array<std::uint32_t, 3> vertices;
-    Vec3 geometricNormal;
-  };
-  struct Piece {
-    std::uint32_t source = 0;         // into sources_
-    std::array<Vec2, 3> barycentric;  // of the piece's corners: weights of vertices 1 and 2
-    double areaBefore = 0.0;          // summed area of the pieces before this one
-    double area = 0.0;
-  };
   SurfacePoint pointOn(const Piece& piece, Vec2 barycentric) const;
 
   const Atlas* atlas_ = nullptr;

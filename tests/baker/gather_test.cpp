@@ -4,6 +4,9 @@
 
 #include <cstring>
 #include <limits>
+#include <memory>
+#include <set>
+#include <utility>
 
 #include "baker/stratified_net.h"
 #include "tests/baker/test_scene.h"
@@ -27,18 +30,39 @@ double meanOf(const BakeResult& result) {
 }
 
 TEST(StratifiedNet, OnePointInEveryCell) {
-  const TexelSampler sampler(7, 1, 2, 3);
-  for (int log2Count = 0; log2Count <= 8; ++log2Count)
+  std::array<TexelSampler, kLanes> samplers;
+  std::array<bool, kLanes> active{};
+  for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
+    samplers[lane] = TexelSampler(7, 1, lane, 3);
+    active[lane] = lane != 5;
+  }
+  const auto lanes = std::make_unique<NetLanes>();
+  for (int log2Count = 0; log2Count <= 10; ++log2Count)
     for (const std::uint32_t block : {0u, 1u, 5u}) {
-      NetByCell net;
-      net.samples.fill(std::numeric_limits<std::uint32_t>::max());
       const NetRange range{block << log2Count, log2Count};
-      net.fill(sampler, range, 4);
-      for (std::uint32_t cell = 0; cell < range.count(); ++cell) {
-        ASSERT_GE(net.samples[cell], range.first);
-        ASSERT_LT(net.samples[cell], range.first + range.count()) << "cell " << cell << " of " << range.count();
-        EXPECT_EQ(net.points[cell], sampler.get2D(net.samples[cell], 4));
-      }
+      lanes->fill(samplers, active, range, 4);
+      const auto columns = static_cast<float>(1 << ((log2Count + 1) / 2));
+      const auto rows = static_cast<float>(1 << (log2Count / 2));
+      std::array<std::set<std::uint32_t>, kLanes> taken;
+      std::set<std::pair<int, int>> cells;
+      for (std::uint32_t cell = 0; cell < range.count(); ++cell)
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+          const Vec2 u(lanes->x(cell)[lane], lanes->y(cell)[lane]);
+          if (!active[lane]) {
+            EXPECT_EQ(u, Vec2(0.0f));
+            continue;
+          }
+          const std::uint32_t sample = lanes->sample(cell, lane);
+          ASSERT_GE(sample, range.first);
+          ASSERT_LT(sample, range.first + range.count());
+          taken[lane].insert(sample);
+          EXPECT_EQ(u, samplers[lane].get2D(sample, 4));
+          // All lanes take a point of the same cell.
+          const std::pair at(static_cast<int>(u.x * columns), static_cast<int>(u.y * rows));
+          EXPECT_EQ(cells.insert(at).second, lane == 0) << "cell " << cell << " of " << range.count();
+        }
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        EXPECT_EQ(taken[lane].size(), active[lane] ? range.count() : 0u);
     }
 }
 
@@ -48,7 +72,7 @@ TEST(StratifiedNet, CoversAnyRange) {
     const NetRange net = netAt(next, 1001);
     EXPECT_EQ(net.first, next);
     EXPECT_EQ(net.first % net.count(), 0u);
-    EXPECT_LE(net.count(), static_cast<std::uint32_t>(kMostNetPoints));
+    EXPECT_LE(net.count(), kMostNetPoints);
     next += net.count();
   }
   EXPECT_EQ(next, 1001u);

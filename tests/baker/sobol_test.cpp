@@ -111,38 +111,5 @@ TEST(SampleLanes, DrawWhatEachTexelDraws) {
   }
 }
 
-TEST(StratumOrder, LanesShareACellAndTakeEverySampleOnce) {
-  const SampleLanes lanes = sixteenTexels();
-  for (const std::uint32_t first : {0u, 1024u}) {
-    StratumOrder order;
-    order.arrange(lanes, 1, first, 256);
-    std::vector<std::set<std::uint32_t>> taken(kLanes);
-    for (std::uint32_t step = 0; step < 256; ++step) {
-      std::set<std::pair<int, int>> cells;
-      for (int lane = 0; lane < kLanes; ++lane) {
-        const std::uint32_t sample = order.sample(step, lane);
-        EXPECT_TRUE(sample >= first && sample < first + 256);
-        taken[static_cast<std::size_t>(lane)].insert(sample);
-        const Vec2 u = TexelSampler(3, 1, static_cast<std::uint32_t>(lane), 9).get2D(sample, 1);
-        cells.insert({static_cast<int>(u.x * 16), static_cast<int>(u.y * 16)});
-      }
-      EXPECT_EQ(cells.size(), 1u) << "step " << step;
-    }
-    for (const auto& samples : taken) EXPECT_EQ(samples.size(), 256u);
-  }
-}
-
-TEST(StratumOrder, AnyCount) {
-  const SampleLanes lanes = sixteenTexels();
-  for (const std::uint32_t count : {1u, 2u, 3u, 100u, StratumOrder::kBlock}) {
-    StratumOrder order;
-    order.arrange(lanes, 1, 0, count);
-    std::set<std::uint32_t> taken;
-    for (std::uint32_t step = 0; step < count; ++step) taken.insert(order.sample(step, 7));
-    EXPECT_EQ(taken.size(), count);
-    EXPECT_EQ(*taken.rbegin(), count - 1);
-  }
-}
-
 }  // namespace
 }  // namespace lumel

@@ -1,0 +1,105 @@
+#include "baker/gather_kernels.h"
+
+#include <limits>
+
+#include "baker/sampling.h"
+#include "lightmap/rnm_basis.h"
+
+namespace lumel {
+namespace {
+
+constexpr float kLeastComponent = 1e-12f;
+
+inline float awayFromZero(float component) {
+  const float least = component < 0.0f ? -kLeastComponent : kLeastComponent;
+  return component < kLeastComponent && component > -kLeastComponent ? least : component;
+}
+
+/// `sampleDirection` has filled rays.dirTangent.
+[[gnu::always_inline]] inline void aim(const PointLanes& from, AimedRays& rays) {
+  RTCRay16& ray = rays.packet.rayhit.ray;
+  RTCHit16& hit = rays.packet.rayhit.hit;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Vec3 world = from.frame[lane].fromLocal(rays.dirTangent[lane]);
+    const bool above = glm::dot(world, from.ng[lane]) > 0.0f;
+    rays.pdf[lane] = gatherHemispherePdf(rays.dirTangent.z[lane]);
+    ray.org_x[lane] = from.rayStart.x[lane];
+    ray.org_y[lane] = from.rayStart.y[lane];
+    ray.org_z[lane] = from.rayStart.z[lane];
+    ray.dir_x[lane] = awayFromZero(world.x);
+    ray.dir_y[lane] = awayFromZero(world.y);
+    ray.dir_z[lane] = awayFromZero(world.z);
+    ray.tfar[lane] = std::numeric_limits<float>::infinity();
+    hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
+    hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
+    rays.packet.valid[lane] = above ? -1 : 0;
+  }
+}
+
+}  // namespace
+
+LUMEL_FOR_EACH_CPU void aimGatherRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    rays.dirTangent.set(lane, sampleGatherHemisphere({x[lane], y[lane]}));
+  aim(from, rays);
+}
+
+LUMEL_FOR_EACH_CPU void aimCosineRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    rays.dirTangent.set(lane, sampleCosineHemisphere({x[lane], y[lane]}));
+  aim(from, rays);
+}
+
+LUMEL_FOR_EACH_CPU bool addLight(const Vec3Lanes& dirTangent, const Vec3Lanes& kernels, const Vec3Lanes& light,
+                                 MapSums& sums) {
+  alignas(64) float red[kLanes], green[kLanes], blue[kLanes];
+  int lost = 0;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const float any = light.x[lane] + light.y[lane] + light.z[lane];
+    const bool isNumber = any - any == 0.0f;
+    lost |= isNumber ? 0 : 1;
+    red[lane] = isNumber ? light.x[lane] : 0.0f;
+    green[lane] = isNumber ? light.y[lane] : 0.0f;
+    blue[lane] = isNumber ? light.z[lane] : 0.0f;
+  }
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const float k[4] = {std::max(0.0f, dirTangent.z[lane]), kernels.x[lane], kernels.y[lane], kernels.z[lane]};
+    sums.sum[0][lane] += red[lane] * k[0];
+    sums.sum[1][lane] += green[lane] * k[0];
+    sums.sum[2][lane] += blue[lane] * k[0];
+    sums.sum[3][lane] += red[lane] * k[1];
+    sums.sum[4][lane] += green[lane] * k[1];
+    sums.sum[5][lane] += blue[lane] * k[1];
+    sums.sum[6][lane] += red[lane] * k[2];
+    sums.sum[7][lane] += green[lane] * k[2];
+    sums.sum[8][lane] += blue[lane] * k[2];
+    sums.sum[9][lane] += red[lane] * k[3];
+    sums.sum[10][lane] += green[lane] * k[3];
+    sums.sum[11][lane] += blue[lane] * k[3];
+  }
+  return lost != 0;
+}
+
+LUMEL_FOR_EACH_CPU void clampedDots(const Vec3Lanes& dirTangent, Vec3Lanes& kernels) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Vec3 dir = dirTangent[lane];
+    const float above = dir.z > 0.0f ? 1.0f : 0.0f;
+    kernels.x[lane] = above * std::max(0.0f, glm::dot(dir, kRnmBasis[0]));
+    kernels.y[lane] = above * std::max(0.0f, glm::dot(dir, kRnmBasis[1]));
+    kernels.z[lane] = above * std::max(0.0f, glm::dot(dir, kRnmBasis[2]));
+  }
+}
+
+LUMEL_FOR_EACH_CPU void turnToTangent(const FrameLanes& frame, const Vec3Lanes& dirWorld, Vec3Lanes& dirTangent) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) dirTangent.set(lane, frame[lane].toLocal(dirWorld[lane]));
+}
+
+LUMEL_FOR_EACH_CPU void settle(MapSums& sums, MapTotals& totals) {
+  for (std::size_t map = 0; map < 12; ++map)
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      totals.sum[map][lane] += static_cast<double>(sums.sum[map][lane]);
+      sums.sum[map][lane] = 0.0f;
+    }
+}
+
+}  // namespace lumel

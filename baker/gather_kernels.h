@@ -1,0 +1,45 @@
+// The inner loops of the gather, over the lanes of a wave: aiming rays, and adding what they found to the maps.
+#pragma once
+
+#include "baker/lanes.h"
+#include "baker/wave_points.h"
+
+namespace lumel {
+
+/// The gather rays of a wave: each lane's goes out from its own point.
+struct AimedRays {
+  Vec3Lanes dirTangent;
+  alignas(64) float pdf[kLanes] = {};  // density per solid angle
+  RayPacket packet;
+};
+
+/// Aims by sampleGatherHemisphere at u = (x, y), kLanes values each. Lanes whose ray would go below the geometric
+/// surface, and those without a texel, are not valid: a bent shading normal gathers from there too, where nothing
+/// arrives. No component of a ray's direction is nearer to zero than 1e-12 (see TraceMode::Coherent).
+void aimGatherRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays);
+
+/// The same by the cosine; `pdf` is still the gather's, for the weight against light samples.
+void aimCosineRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays);
+
+/// Sums of irradiance / pi over a few samples: of the flat map's three colours, then of those of the RNM maps.
+struct alignas(64) MapSums {
+  float sum[12][kLanes] = {};
+};
+struct alignas(64) MapTotals {
+  double sum[12][kLanes] = {};
+};
+
+/// Adds light that arrives along dirTangent: times max(0, z) to the flat map, times the kernels to the others.
+/// Light that is not finite is left out; returns whether there was any.
+bool addLight(const Vec3Lanes& dirTangent, const Vec3Lanes& kernels, const Vec3Lanes& light, MapSums& sums);
+
+/// RnmKernels::clampedDots for all lanes.
+void clampedDots(const Vec3Lanes& dirTangent, Vec3Lanes& kernels);
+
+/// dirTangent = frame.toLocal(dirWorld).
+void turnToTangent(const FrameLanes& frame, const Vec3Lanes& dirWorld, Vec3Lanes& dirTangent);
+
+/// Moves the sums to the totals.
+void settle(MapSums& sums, MapTotals& totals);
+
+}  // namespace lumel

@@ -1,0 +1,47 @@
+// 16 values side by side: a wave of texels is worked on in plain loops over its lanes, which the compiler turns into
+// vector code for the processor at hand.
+#pragma once
+
+#include <cstddef>
+
+#include "scene/math.h"
+
+// Compiles a function for several instruction sets; the one that fits is chosen when the program is loaded. Each gives
+// the same bits: products and sums are not fused (the baker's CMakeLists.txt says so) and nothing is reassociated.
+// Sanitizers do not take functions that are chosen at loading.
+#if defined(__x86_64__) && defined(__ELF__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define LUMEL_FOR_EACH_CPU __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define LUMEL_FOR_EACH_CPU
+#endif
+
+namespace lumel {
+
+/// Texels that advance in step: one lane each, one packet per ray call.
+inline constexpr int kLanes = 16;
+
+struct alignas(64) Vec3Lanes {
+  float x[kLanes] = {};
+  float y[kLanes] = {};
+  float z[kLanes] = {};
+
+  Vec3 operator[](std::size_t lane) const { return {x[lane], y[lane], z[lane]}; }
+  void set(std::size_t lane, const Vec3& v) {
+    x[lane] = v.x;
+    y[lane] = v.y;
+    z[lane] = v.z;
+  }
+};
+
+struct FrameLanes {
+  Vec3Lanes t, b, n;
+
+  Frame operator[](std::size_t lane) const { return {t[lane], b[lane], n[lane]}; }
+  void set(std::size_t lane, const Frame& frame) {
+    t.set(lane, frame.t);
+    b.set(lane, frame.b);
+    n.set(lane, frame.n);
+  }
+};
+
+}  // namespace lumel

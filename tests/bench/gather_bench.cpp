@@ -1,0 +1,269 @@
+// The gather against a naive loop over the same rays, and where its time goes. One thread; CPU time.
+//   lumel_bench_gather                                everything
+//   lumel_bench_gather --benchmark_filter=speedup     the ratios, naive and gather taken in turns
+//   lumel_bench_gather --benchmark_filter=smoke       the smoke pass of ctest
+// Counters: ns per ray in all (gather_ns, naive_ns), inside Embree (trace_ns, naive_trace_ns) and outside of it.
+#include <benchmark/benchmark.h>
+
+#include <time.h>
+#include <xmmintrin.h>
+
+#include <algorithm>
+#include <functional>
+#include <map>
+
+#include "baker/gather_wave.h"
+#include "tests/bench/gather_scenes.h"
+
+namespace lumel {
+namespace {
+
+using namespace bench_scenes;
+
+// As GatherWave numbers them: the naive loop takes the same samples.
+constexpr std::uint32_t kFootprint = kLightPatterns;
+constexpr std::uint32_t kDirection = kLightPatterns + 1;
+constexpr std::uint32_t kPoints = WavePoints::kMost;
+
+enum Place : int { Rooms, Foliage };
+
+/// A scene ready to gather in, its cache filled with arbitrary light.
+struct Fixture {
+  explicit Fixture(int place)
+      : grid(place == Rooms ? furnishedRooms() : foliage()),
+        transport(grid),
+        light(transport.light()),
+        map(*transport.rays, grid.atlas, transport.texels),
+        scene{.transport = light, .kernels = kernels, .atlas = grid.atlas, .texels = transport.texels, .map = map} {
+    scene.levels = {.count = 1, .base = 0, .endless = true};
+    scene.lastDepth = 64;
+    for (std::size_t t = 0; t < map.size(); ++t) cache.emplace_back(0.1f + unitFloat(hashBits(static_cast<std::uint32_t>(t))));
+    const PageTexels& page = transport.texels[0];
+    pixels.assign(static_cast<std::size_t>(page.width) * static_cast<std::size_t>(page.height), kNoTexel);
+    for (std::size_t t = 0; t < page.size(); ++t) pixels[pixelOf(page.coords[t].x, page.coords[t].y)] = static_cast<std::uint32_t>(t);
+  }
+  std::size_t pixelOf(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(transport.texels[0].width) + static_cast<std::size_t>(x);
+  }
+
+  GridScene grid;
+  Transport transport;
+  LightTransport light;
+  RnmKernels kernels{Projection::Flat};
+  TexelMap map;
+  GatherScene scene;
+  std::vector<Vec3> cache;
+  std::vector<std::uint32_t> pixels;  // the naive loop's own way from a pixel to its texel
+};
+
+const Fixture& fixture(int place) {
+  static std::map<int, std::unique_ptr<Fixture>> made;
+  auto& f = made[place];
+  if (!f) f = std::make_unique<Fixture>(place);
+  return *f;
+}
+
+/// First texels of waves, spread evenly over the page.
+std::vector<std::size_t> spreadWaves(const Fixture& f, std::size_t count) {
+  const std::size_t waves = f.transport.texels[0].size() / kLanes;
+  std::vector<std::size_t> firsts;
+  for (std::size_t i = 0; i < count; ++i) firsts.push_back(i * waves / count * kLanes);
+  return firsts;
+}
+
+double cpuSeconds() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+struct Maps {
+  Vec3d flat{0};
+  std::array<Vec3d, 3> rnm{Vec3d(0), Vec3d(0), Vec3d(0)};
+};
+
+struct NaiveRay {
+  RTCRayHit ray;
+  Vec3 local;
+  float pdf;
+};
+
+/// The rays of one texel as one would write them down; visit(ray) for each.
+template <class Visit>
+void forEachNaiveRay(const Fixture& f, std::size_t texel, std::uint32_t samples, Visit visit) {
+  const PageTexels& page = f.transport.texels[0];
+  TexelFootprint footprint;
+  if (!(footprint.clip(f.grid.atlas, page, texel) > 0)) return;
+  const TexelSampler sampler(f.scene.seed, 0, page.coords[texel].x, page.coords[texel].y);
+  std::array<SurfacePoint, kPoints> points;
+  std::array<Vec3, kPoints> starts;
+  for (std::uint32_t i = 0; i < kPoints; ++i) {
+    points[i] = footprint.sample(sampler.get2D(i, kFootprint));
+    const Surface& surface = f.grid.atlas.surfaces[points[i].triangle.surface];
+    const std::uint32_t* v = &surface.indices[std::size_t{3} * points[i].triangle.triangle];
+    starts[i] = offsetPoint(points[i].position, points[i].geometricNormal,
+                            {surface.positions[v[0]], surface.positions[v[1]], surface.positions[v[2]]}, 0.0f);
+  }
+  for (std::uint32_t s = 0; s < samples; ++s) {
+    const SurfacePoint& point = points[s % kPoints];
+    NaiveRay made;
+    made.local = sampleGatherHemisphere(sampler.get2D(s, kDirection));
+    made.pdf = gatherHemispherePdf(made.local.z);
+    const Vec3 dir = point.frame.fromLocal(made.local);
+    if (!(glm::dot(dir, point.geometricNormal) > 0)) continue;
+    const Vec3& start = starts[s % kPoints];
+    made.ray.ray = {start.x, start.y, start.z, 0.0f, dir.x, dir.y, dir.z, 0.0f, std::numeric_limits<float>::infinity(), ~0u, 0, 0};
+    made.ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    made.ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    visit(made);
+  }
+}
+
+Maps gatherNaively(const Fixture& f, std::size_t texel, std::uint32_t samples) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCScene embree = f.transport.rays->embreeScene();
+  const Page& page = f.grid.atlas.pages[0];
+  Maps maps;
+  forEachNaiveRay(f, texel, samples, [&](NaiveRay& made) {
+    rtcIntersect1(embree, &context, &made.ray);
+    const RTCHit& hit = made.ray.hit;
+    if (hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
+    const Vec3 dir(made.ray.ray.dir_x, made.ray.ray.dir_y, made.ray.ray.dir_z);
+    if (glm::dot(dir, Vec3(hit.Ng_x, hit.Ng_y, hit.Ng_z)) > 0) return;
+    const Surface& surface = f.grid.atlas.surfaces[hit.geomID];
+    const std::uint32_t* v = &surface.indices[std::size_t{3} * hit.primID];
+    const Vec2 uv = (1 - hit.u - hit.v) * surface.lightmapUvs[v[0]] + hit.u * surface.lightmapUvs[v[1]] +
+                    hit.v * surface.lightmapUvs[v[2]];
+    const int x = std::min(static_cast<int>(uv.x * static_cast<float>(page.width)), page.width - 1);
+    const int y = std::min(static_cast<int>(uv.y * static_cast<float>(page.height)), page.height - 1);
+    const std::uint32_t found = f.pixels[f.pixelOf(x, y)];
+    if (found == kNoTexel) return;
+    const Vec3 light = f.cache[found] * (kInvPi / made.pdf);
+    const Vec3 k = f.kernels(made.local);
+    maps.flat += Vec3d(light * made.local.z);
+    for (int i = 0; i < 3; ++i) maps.rnm[static_cast<std::size_t>(i)] += Vec3d(light * k[i]);
+  });
+  return maps;
+}
+
+/// Seconds in Embree alone for the naive loop's rays.
+double traceNaively(const Fixture& f, std::size_t texel, std::uint32_t samples) {
+  static std::vector<NaiveRay> rays;
+  rays.clear();
+  forEachNaiveRay(f, texel, samples, [&](const NaiveRay& ray) { rays.push_back(ray); });
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  const double start = cpuSeconds();
+  for (NaiveRay& ray : rays) rtcIntersect1(f.transport.rays->embreeScene(), &context, &ray.ray);
+  return cpuSeconds() - start;
+}
+
+/// Seconds in Embree alone for the packets of one wave.
+double tracePackets(const Fixture& f, std::size_t first, std::uint32_t samples, TraceMode mode) {
+  const PageTexels& page = f.transport.texels[0];
+  WavePoints points(*f.transport.rays, f.grid.atlas, page, first, kLanes);
+  std::array<TexelSampler, kLanes> samplers;
+  std::array<bool, kLanes> covered;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    samplers[lane] = TexelSampler(f.scene.seed, 0, page.coords[first + lane].x, page.coords[first + lane].y);
+    covered[lane] = points.covered(lane);
+  }
+  static std::vector<AimedRays> packets;
+  packets.clear();
+  NetLanes lanes;
+  for (std::uint32_t s = 0; s < samples;) {
+    const NetRange net = netAt(s, samples);
+    points.draw(samplers, kFootprint, net.first, std::min(kPoints, net.count()));
+    lanes.fill(samplers, covered, net, kDirection);
+    for (std::uint32_t cell = 0; cell < net.count(); ++cell) {
+      packets.emplace_back();
+      aimGatherRays(lanes.x(cell), lanes.y(cell), points[cell], packets.back());
+    }
+    s += net.count();
+  }
+  const double start = cpuSeconds();
+  for (AimedRays& rays : packets) f.transport.rays->intersect(rays.packet, mode);
+  return cpuSeconds() - start;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+/// Naive loop and gather in turns over the same waves; medians over rounds.
+void compare(benchmark::State& state, int place, std::uint32_t samples, TraceMode mode, std::size_t waves, int rounds) {
+  const Fixture& f = fixture(place);
+  GatherScene scene = f.scene;
+  scene.gatherMode = mode;
+  _mm_setcsr(_mm_getcsr() | 0x8040u);  // as bakes do
+  const std::vector<std::size_t> firsts = spreadWaves(f, waves);
+  std::map<std::string, std::vector<double>> ns;
+  std::vector<double> ratios;
+  double naiveSum = 0, gatherSum = 0;
+  for (auto _ : state) {
+    for (int round = 0; round < rounds; ++round) {
+      double naive = 0, naiveTrace = 0, gather = 0, trace = 0, rays = 0;
+      for (const std::size_t first : firsts) {
+        double start = cpuSeconds();
+        for (std::size_t t = first; t < first + kLanes; ++t) naiveSum += gatherNaively(f, t, samples).flat.x;
+        naive += cpuSeconds() - start;
+        start = cpuSeconds();
+        GatherWave wave(scene, 0, first, kLanes);
+        const GatheredWave done = wave.gather(0, samples, f.cache);
+        gather += cpuSeconds() - start;
+        for (const GatheredTexel& texel : done.texels) gatherSum += texel.flat.x;
+        rays += static_cast<double>(done.rays);
+        for (std::size_t t = first; t < first + kLanes; ++t) naiveTrace += traceNaively(f, t, samples);
+        trace += tracePackets(f, first, samples, mode);
+      }
+      for (const auto& [name, seconds] : {std::pair("naive_ns", naive), std::pair("naive_trace_ns", naiveTrace),
+                                          std::pair("gather_ns", gather), std::pair("trace_ns", trace),
+                                          std::pair("outside_ns", gather - trace),
+                                          std::pair("naive_outside_ns", naive - naiveTrace)})
+        ns[name].push_back(1e9 * seconds / rays);
+      ratios.push_back(naive / gather);
+    }
+  }
+  for (const auto& [name, values] : ns) state.counters[name] = median(values);
+  state.counters["speedup"] = median(ratios);
+  state.counters["agreement"] = gatherSum / naiveSum;
+  state.counters["triangles"] = static_cast<double>(f.grid.triangles());
+}
+
+void speedup(benchmark::State& state) {
+  compare(state, static_cast<int>(state.range(0)), static_cast<std::uint32_t>(state.range(1)),
+          state.range(2) != 0 ? TraceMode::Coherent : TraceMode::Packet, 64, 5);
+}
+BENCHMARK(speedup)
+    ->ArgNames({"foliage", "rays", "coherent"})
+    ->ArgsProduct({{Rooms, Foliage}, {64, 256, 1024}, {0, 1}})
+    ->Iterations(1)
+    ->Unit(benchmark::kSecond);
+
+/// The gather alone, for a profiler.
+void gather(benchmark::State& state) {
+  const Fixture& f = fixture(static_cast<int>(state.range(0)));
+  _mm_setcsr(_mm_getcsr() | 0x8040u);
+  const std::vector<std::size_t> firsts = spreadWaves(f, 256);
+  std::int64_t rays = 0;
+  for (auto _ : state)
+    for (const std::size_t first : firsts) {
+      GatherWave wave(f.scene, 0, first, kLanes);
+      rays += static_cast<std::int64_t>(wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache).rays);
+    }
+  state.SetItemsProcessed(rays);
+}
+BENCHMARK(gather)->ArgNames({"foliage", "rays"})->ArgsProduct({{Rooms, Foliage}, {16, 64, 256}})->Unit(benchmark::kMillisecond);
+
+void smoke(benchmark::State& state) {
+  compare(state, Rooms, 16, TraceMode::Packet, 2, 1);
+  compare(state, Rooms, 16, TraceMode::Coherent, 2, 1);
+}
+BENCHMARK(smoke)->Iterations(1)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace lumel
+
+BENCHMARK_MAIN();
