@@ -141,7 +141,8 @@ class AtlasBuilder {
       for (const UnwrappedChart& chart : layout.unwrapped.charts) {
         const ChartPlace& place = places.charts[shape++];
         const auto index = static_cast<std::uint32_t>(atlas.charts.size());
-        atlas.charts.push_back({-1, atlas.texelsPerMeter * instance.settings.texelDensityScale});
+        const double snap = std::sqrt(place.scale.x * place.scale.y) / (use.scale * places.scale);
+        atlas.charts.push_back({-1, atlas.texelsPerMeter * instance.settings.texelDensityScale * static_cast<float>(snap)});
         const auto& size = places.pages[static_cast<std::size_t>(place.page)];
         for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
           const SourceTriangle& source = layout.source[chart.triangles[t]];

@@ -19,13 +19,13 @@ double guessDensity(double area, int pageSize);
 /// page texel = placement(scale * (u, -v) + shift).
 struct ChartPlace {
   int page = 0;
-  double scale = 1.0;
+  Vec2d scale{1.0};  // differs by a few percent between the axes where borders were moved to whole texels
   Vec2d shift{0.0};
   int quarterTurns = 0;
   Vec2d offset{0.0};
 
   Vec2d apply(Vec2 uv) const {
-    Vec2d p(uv.x * scale + shift.x, -uv.y * scale + shift.y);
+    Vec2d p(uv.x * scale.x + shift.x, -uv.y * scale.y + shift.y);
     for (int i = 0; i < quarterTurns; ++i) p = Vec2d(-p.y, p.x);
     return p + offset;
   }

@@ -16,14 +16,15 @@ namespace {
 constexpr double kCoverageGoal = 0.85;
 
 /// Page coordinates from shape coordinates for a bitmap turned and put at `cell`.
-Placement placementOf(const GridShape& shape, const Place& place, int page, int block) {
+Placement placementOf(const GridShape& shape, const Place& place, int page, const GridSettings& settings) {
   const int turns = shape.orientations[static_cast<std::size_t>(place.orientation)].quarterTurns;
   const double w = shape.texels.width();
   const double h = shape.texels.height();
   const std::array<Vec2d, 4> back = {Vec2d(0, 0), Vec2d(h, 0), Vec2d(w, h), Vec2d(0, w)};
   Vec2d offset = shape.toBitmap;
   for (int i = 0; i < turns; ++i) offset = Vec2d(-offset.y, offset.x);
-  offset += back[static_cast<std::size_t>(turns)] + Vec2d(place.cell.x * block, place.cell.y * block);
+  offset += back[static_cast<std::size_t>(turns)] + Vec2d(place.cell.x * settings.block, place.cell.y * settings.block) +
+            Vec2d(settings.margin);
   return {page, turns, Vec2(offset)};
 }
 
@@ -32,6 +33,12 @@ struct Group {
   std::vector<std::uint32_t> shapes;  // still to place, large first
   std::size_t room = 0;
   bool opened = false;  // some of its shapes lie on an earlier page
+};
+
+/// A page as it could be.
+struct Filling {
+  std::vector<std::pair<std::uint32_t, Place>> placed;
+  double coverage = 0.0;
 };
 
 class AtlasPacker {
@@ -47,10 +54,12 @@ class AtlasPacker {
 
  private:
   std::vector<Group> makeGroups(std::span<const PackShape> sources) const;
-  std::vector<std::uint32_t> selectForPage(std::vector<Group>& groups) const;
+  std::vector<std::uint32_t> selectForPage(const std::vector<Group>& groups, std::vector<bool>& selected) const;
+  Filling fillByGroups(const std::vector<Group>& groups) const;
+  Filling fillBySize(const std::vector<Group>& groups) const;
   void fillPage(std::vector<Group>& groups, int page);
   bool packAll(const std::vector<std::uint32_t>& chosen, int width, int height, int page);
-  void placeInto(PagePacker& packer, Group& group, int page);
+  void placeInto(PagePacker& packer, const std::vector<std::uint32_t>& shapes, Filling& filling) const;
   void shrinkLastPage();
   std::size_t roomOf(const std::vector<std::uint32_t>& shapes) const;
 
@@ -87,47 +96,71 @@ std::vector<Group> AtlasPacker::makeGroups(std::span<const PackShape> sources) c
 
 /// Whole groups for the next page: those already begun first, then the largest that its room still holds; where even
 /// one group is too much for a page, that group.
-std::vector<std::uint32_t> AtlasPacker::selectForPage(std::vector<Group>& groups) const {
+std::vector<std::uint32_t> AtlasPacker::selectForPage(const std::vector<Group>& groups,
+                                                      std::vector<bool>& selected) const {
   const std::size_t page =
       static_cast<std::size_t>(settings_.pageCells) * static_cast<std::size_t>(settings_.pageCells);
   std::size_t sum = 0;
-  std::vector<std::uint32_t> selected;
-  const auto take = [&](Group& group) {
-    selected.insert(selected.end(), group.shapes.begin(), group.shapes.end());
-    sum += group.room;
-    group.opened = true;
+  std::vector<std::uint32_t> shapes;
+  const auto take = [&](std::size_t g) {
+    shapes.insert(shapes.end(), groups[g].shapes.begin(), groups[g].shapes.end());
+    sum += groups[g].room;
+    selected[g] = true;
   };
-  for (Group& group : groups)
-    if (group.opened) take(group);
-  for (Group& group : groups)
-    if (!group.opened && (sum == 0 || sum + group.room <= page)) take(group);
-  sortBySize(shapes_, options_.pageSize, selected);
-  return selected;
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    if (groups[g].opened) take(g);
+  for (std::size_t g = 0; g < groups.size(); ++g)
+    if (!selected[g] && (sum == 0 || sum + groups[g].room <= page)) take(g);
+  sortBySize(shapes_, options_.pageSize, shapes);
+  return shapes;
 }
 
-void AtlasPacker::placeInto(PagePacker& packer, Group& group, int page) {
-  for (const std::uint32_t i : group.shapes) {
+void AtlasPacker::placeInto(PagePacker& packer, const std::vector<std::uint32_t>& shapes, Filling& filling) const {
+  for (const std::uint32_t i : shapes) {
     if (progress_.cancelled()) return;
-    if (const auto place = packer.place(shapes_[i])) {
-      places_[i] = *place;
-      pageOf_[i] = page;
-      group.opened = true;
-      progress_.advance(1);
-    }
+    if (const auto place = packer.place(shapes_[i])) filling.placed.emplace_back(i, *place);
   }
+  filling.coverage = packer.coverage();
 }
 
-void AtlasPacker::fillPage(std::vector<Group>& groups, int page) {
+Filling AtlasPacker::fillByGroups(const std::vector<Group>& groups) const {
   PagePacker packer(settings_, settings_.pageCells, settings_.pageCells);
-  Group selected;
-  selected.shapes = selectForPage(groups);
-  placeInto(packer, selected, page);
-  for (Group& group : groups) {
-    if (progress_.cancelled() || packer.coverage() >= kCoverageGoal) break;
-    if (!group.opened) placeInto(packer, group, page);
+  Filling filling;
+  std::vector<bool> selected(groups.size(), false);
+  placeInto(packer, selectForPage(groups, selected), filling);
+  for (std::size_t g = 0; g < groups.size() && filling.coverage < kCoverageGoal; ++g)
+    if (!selected[g]) placeInto(packer, groups[g].shapes, filling);
+  return filling;
+}
+
+Filling AtlasPacker::fillBySize(const std::vector<Group>& groups) const {
+  PagePacker packer(settings_, settings_.pageCells, settings_.pageCells);
+  std::vector<std::uint32_t> shapes;
+  for (const Group& group : groups) shapes.insert(shapes.end(), group.shapes.begin(), group.shapes.end());
+  sortBySize(shapes_, options_.pageSize, shapes);
+  Filling filling;
+  placeInto(packer, shapes, filling);
+  return filling;
+}
+
+/// The next page. Groups that do not share a page well are mixed.
+void AtlasPacker::fillPage(std::vector<Group>& groups, int page) {
+  std::size_t left = 0;
+  for (const Group& group : groups) left += group.shapes.size();
+  Filling filling = fillByGroups(groups);
+  if (groups.size() > 1 && filling.placed.size() < left && filling.coverage < kCoverageGoal) {
+    Filling mixed = fillBySize(groups);
+    if (mixed.coverage > filling.coverage) filling = std::move(mixed);
   }
+  for (const auto& [shape, place] : filling.placed) {
+    places_[shape] = place;
+    pageOf_[shape] = page;
+  }
+  progress_.advance(filling.placed.size());
   for (Group& group : groups) {
+    const std::size_t before = group.shapes.size();
     std::erase_if(group.shapes, [&](std::uint32_t i) { return pageOf_[i] >= 0; });
+    group.opened = group.opened || group.shapes.size() < before;
     group.room = roomOf(group.shapes);
   }
   std::erase_if(groups, [](const Group& group) { return group.shapes.empty(); });
@@ -193,9 +226,9 @@ Expected<PackResult> AtlasPacker::run(std::span<const PackShape> sources) {
   result.placements.resize(shapes_.size());
   for (std::size_t i = 0; i < shapes_.size(); ++i) {
     if (shapes_[i].texels.empty())
-      result.placements[i] = {0, 0, Vec2(shapes_[i].toBitmap + Vec2d(settings_.border * settings_.block))};
+      result.placements[i] = {0, 0, Vec2(shapes_[i].toBitmap + Vec2d(settings_.border + settings_.margin))};
     else if (pageOf_[i] >= 0)
-      result.placements[i] = placementOf(shapes_[i], places_[i], pageOf_[i], settings_.block);
+      result.placements[i] = placementOf(shapes_[i], places_[i], pageOf_[i], settings_);
   }
   for (const auto& page : pages_) {
     const auto texels = [&](int cells) {
@@ -208,7 +241,7 @@ Expected<PackResult> AtlasPacker::run(std::span<const PackShape> sources) {
 
 Expected<void> checkSizes(const std::vector<GridShape>& shapes, std::span<const PackShape> sources,
                           const GridSettings& settings) {
-  const int limit = (settings.pageCells - 2 * settings.border) * settings.block;
+  const int limit = settings.pageCells * settings.block - 2 * (settings.border + settings.margin);
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     const Vec2d size = shapes[i].size;
     if (std::max(size.x, size.y) > limit)
@@ -226,12 +259,7 @@ Expected<PackResult> packCharts(std::span<const PackShape> shapes, const PackOpt
   if (options.pageSize < 1 || options.pageSize > kLargestPage)
     return usageError("packing: --page-size " + std::to_string(options.pageSize) + " is not in 1.." +
                       std::to_string(kLargestPage));
-  GridSettings settings;
-  settings.block = std::max(1, options.blockAlign);
-  settings.padding = std::max(0, options.padding);
-  settings.border = ((settings.padding + 1) / 2 + settings.block - 1) / settings.block;
-  settings.pageCells = options.pageSize / settings.block;
-
+  const GridSettings settings = gridSettings(options.pageSize, options.padding, options.blockAlign);
   std::vector<GridShape> prepared = rasteriseShapes(shapes);
   if (const auto fits = checkSizes(prepared, shapes, settings); !fits) return fits.error();
   addOrientations(shapes, settings, prepared);

@@ -23,7 +23,8 @@ struct PackOptions {
   int pageSize = 1024;
   int maxPages = 0;        // 0: as many as needed
   int padding = 2;         // texels between any two charts' covered texels, and half of it (rounded up) to the border
-  int blockAlign = 0;      // charts start on multiples of this, and no block holds texels of two charts; 0 = off
+  int blockAlign = 0;      // no block of so many texels a side holds texels of two charts: a chart with half of the
+                           // padding (rounded up) around it starts on a block; 0 = off
   bool shrinkLast = true;  // the last page gets the smallest power-of-two sides that hold its charts
 };
 
