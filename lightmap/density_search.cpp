@@ -17,10 +17,12 @@ class Placer {
   Placer(const ObjectLayouts& objects, const AtlasOptions& options, Progress& progress)
       : objects_(objects), options_(options), progress_(progress) {}
 
-  Expected<ChartPlaces> placeAt(double scale, bool onePage) {
+  Expected<ChartPlaces> placeAt(double scale, bool onePage, const KeptLayout* kept = nullptr) {
     ChartPlaces places;
     places.scale = scale;
     std::vector<PackShape> shapes = makeShapes(scale, places.charts);
+    if (kept)
+      for (std::size_t i = 0; i < shapes.size(); ++i) shapes[i].keep = kept->charts[i];
     PackOptions pack;
     pack.pageSize = options_.pageSize;
     pack.maxPages = onePage ? 1 : 0;
@@ -35,6 +37,9 @@ class Placer {
       places.charts[i].page = placement.page;
       places.charts[i].quarterTurns = placement.quarterTurns;
       places.charts[i].offset = Vec2d(placement.offset);
+      places.charts[i].x = placement.x;
+      places.charts[i].y = placement.y;
+      places.charts[i].kept = placement.kept;
     }
     places.pages = std::move(packed->pages);
     return places;
@@ -128,9 +133,16 @@ double guessDensity(double area, int pageSize) {
   return std::sqrt(kShare * pageSize * pageSize / area);
 }
 
-Expected<ChartPlaces> placeCharts(const ObjectLayouts& objects, const AtlasOptions& options, double mostScale, Progress& progress) {
+Expected<ChartPlaces> placeCharts(const ObjectLayouts& objects, const AtlasOptions& options, double mostScale,
+                                  const KeptLayout* kept, Progress& progress) {
   Placer placer(objects, options, progress);
-  return options.texelsPerMeter > 0 ? placer.placeAt(1.0, false) : placer.fillOnePage(mostScale > 0 ? mostScale : std::numeric_limits<double>::infinity());
+  const bool search = !(options.texelsPerMeter > 0);
+  if (kept) {
+    Expected<ChartPlaces> places = placer.placeAt(kept->scale, search, kept);
+    if (places || places.error().kind != ErrorKind::Usage) return places;
+  }
+  if (!search) return placer.placeAt(kept ? kept->scale : 1.0, false);
+  return placer.fillOnePage(mostScale > 0 ? mostScale : std::numeric_limits<double>::infinity());
 }
 
 }  // namespace lumel

@@ -271,6 +271,17 @@ std::optional<Fit> PackGrid::findLowest(const SearchMask& mask, int firstRow, in
   return std::nullopt;
 }
 
+bool PackGrid::fits(const SearchMask& mask, Cell cell) const {
+  if (cell.x < border_ || cell.y < border_) return false;
+  if (cell.x > width_ - border_ - mask.width || cell.y > height_ - border_ - mask.height) return false;
+  for (const Probe& probe : mask.probes) {
+    const Level& level = (probe.square ? squares_ : runs_)[probe.level];
+    const int x = cell.x + probe.dx;
+    if ((row(level, cell.y + probe.dy)[x >> 6] >> (x & 63)) & 1) return false;
+  }
+  return true;
+}
+
 void PackGrid::insert(const Bitmap& taken, int x, int y) {
   const int firstRow = std::max(0, y);
   const int lastRow = std::min(height_, y + taken.height());

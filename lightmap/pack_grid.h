@@ -58,6 +58,9 @@ class PackGrid {
   /// contact (of the first 64 that have something beside them; the leftmost of equals).
   std::optional<Fit> findLowest(const SearchMask& mask, int firstRow, int lastRow) const;
 
+  /// Whether the mask touches no taken cell there. Any cell may be asked for.
+  bool fits(const SearchMask& mask, Cell cell) const;
+
   /// Takes the cells of `taken` with its corner at (x, y); parts outside the page are cut off.
   void insert(const Bitmap& taken, int x, int y);
 

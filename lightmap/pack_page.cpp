@@ -94,12 +94,21 @@ std::optional<Place> PagePacker::findPlace(const GridShape& shape, Stance stance
 std::optional<Place> PagePacker::place(const GridShape& shape, Stance stance) {
   std::optional<Place> place = findPlace(shape, stance);
   if (!place && stance != Stance::Any) place = findPlace(shape, Stance::Any);
-  if (!place) return std::nullopt;
-  const int turns = shape.orientations[static_cast<std::size_t>(place->orientation)].quarterTurns;
-  const Taken taken = takenBy(shape, turns, settings_);
-  grid_.insert(taken.cells, place->cell.x - taken.margin, place->cell.y - taken.margin);
-  covered_ += shape.cells;
+  if (place) take(shape, *place);
   return place;
+}
+
+bool PagePacker::placeAt(const GridShape& shape, const Place& place) {
+  if (!grid_.fits(shape.orientations[static_cast<std::size_t>(place.orientation)].mask, place.cell)) return false;
+  take(shape, place);
+  return true;
+}
+
+void PagePacker::take(const GridShape& shape, const Place& place) {
+  const int turns = shape.orientations[static_cast<std::size_t>(place.orientation)].quarterTurns;
+  const Taken taken = takenBy(shape, turns, settings_);
+  grid_.insert(taken.cells, place.cell.x - taken.margin, place.cell.y - taken.margin);
+  covered_ += shape.cells;
 }
 
 double PagePacker::coverage() const {

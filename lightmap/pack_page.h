@@ -29,10 +29,14 @@ class PagePacker {
   /// stance if it fits in one of them. Nothing: it fits nowhere.
   std::optional<Place> place(const GridShape& shape, Stance stance = Stance::Any);
 
+  /// Puts it there, if it fits.
+  bool placeAt(const GridShape& shape, const Place& place);
+
   std::size_t freeCells() const { return grid_.freeCells(); }
   double coverage() const;
 
  private:
+  void take(const GridShape& shape, const Place& place);
   std::optional<Place> findPlace(const GridShape& shape, Stance stance);
 
   GridSettings settings_;
