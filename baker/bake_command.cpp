@@ -8,6 +8,7 @@
 #include "baker/bake_files.h"
 #include "baker/command.h"
 #include "baker/conventions.h"
+#include "baker/earlier_layout.h"
 #include "baker/finish.h"
 #include "baker/stage_clock.h"
 #include "lightmap/atlas.h"
@@ -35,6 +36,7 @@ struct BakeArguments {
   fs::path scene;
   fs::path output;
   AtlasOptions atlas;
+  fs::path layoutFrom;
   BakeOptions bake;
   Denoise denoise = Denoise::Auto;
   int dilate = kDilateByPadding;
@@ -49,7 +51,8 @@ struct BakeArguments {
   int samples = 0;  // 0: as the quality has it
 };
 
-void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas) {
+void declareAtlasOptions(OptionTable& options, BakeArguments& a) {
+  AtlasOptions& atlas = a.atlas;
   options.group("Atlas");
   options.choice("uv", atlas.uvSource, {"auto", "scene", "generate"},
                  "Lightmap UVs: TEXCOORD_1 where it is valid, else generated (auto); TEXCOORD_1 or an error (scene); "
@@ -61,7 +64,10 @@ void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas) {
   options.number("max-stretch", atlas.maxStretch, {1.0f, 1000.0f},
                  "A chart whose texels are stretched more than this is split");
   options.integer("block-align", atlas.blockAlign, {0, 64},
-                  "Align charts to blocks of so many texels, 4 for block compression; 0: off");
+                  "Let no block of so many texels hold two charts, 4 for block compression; 0: off");
+  options.path("layout-from", a.layoutFrom,
+               "Folder of an earlier bake, may be the output's: unchanged charts stay where they are in it [none]")
+      .placeholder = "DIR";
 }
 
 void declareLightOptions(OptionTable& options, BakeArguments& a) {
@@ -106,7 +112,7 @@ void declareOptions(OptionTable& options, BakeArguments& a) {
   options.integer("dilate", a.dilate, {0, 1024}, "Rings of texels grown around charts; 0: none").defaultText =
       "half of --padding";
   options.flag("allow-outside-paths", a.allowOutsidePaths, "Let the scene name files outside its own folder");
-  declareAtlasOptions(options, a.atlas);
+  declareAtlasOptions(options, a);
   declareLightOptions(options, a);
   options.group("General");
   options.integer("threads", a.threads, {0, 1024}, "Threads to use, without influence on the result; 0: one per core");
@@ -211,6 +217,22 @@ BakeRecord recordOf(const BakeArguments& a, int dilate, nlohmann::ordered_json s
   return record;
 }
 
+Expected<AtlasResult> makeAtlas(const Scene& scene, const BakeArguments& a, CommandContext& context) {
+  AtlasOptions options = a.atlas;
+  if (!a.layoutFrom.empty()) {
+    auto layout = readEarlierLayout(a.layoutFrom);
+    if (!layout) return layout.error();
+    options.layout = std::move(*layout);
+  }
+  auto atlas = buildAtlas(scene, options, context.progress);
+  if (!atlas || context.quiet) return atlas;
+  printWarnings(atlas->report.warnings);
+  if (options.layout)
+    std::fprintf(stderr, "%zu of %zu charts (%.1f%% of their surface) stay where they were\n", atlas->report.keptCharts,
+                 atlas->report.generatedCharts, 100.0 * atlas->report.keptShare);
+  return atlas;
+}
+
 Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   if (auto checked = check(a); !checked) return checked;
   if (auto writable = checkWritable(a.output); !writable) return writable;
@@ -233,9 +255,8 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   if (progress.cancelled()) return interrupted();
 
   clock.start("atlas");
-  const auto atlas = buildAtlas(*scene, a.atlas, progress);
+  const auto atlas = makeAtlas(*scene, a, context);
   if (!atlas) return atlas.error();
-  if (!context.quiet) printWarnings(atlas->report.warnings);
   clock.start("texels");
   const auto texels = findTexels(atlas->atlas);
   clock.start("bake");

@@ -1,5 +1,7 @@
 #include "baker/bake_json.h"
 
+#include <cstdio>
+
 #include "baker/conventions.h"
 #include "baker/version.h"
 
@@ -7,6 +9,7 @@ namespace lumel {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
 
 Json toJson(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 
@@ -57,6 +60,12 @@ Json describePages(const Atlas& atlas, const BakeResult& result) {
   return pages;
 }
 
+std::string hexOf(std::uint64_t value) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
+  return text;
+}
+
 Json describeCharts(const Atlas& atlas) {
   std::vector<std::size_t> triangles(atlas.charts.size(), 0);
   for (const Surface& surface : atlas.surfaces)
@@ -65,9 +74,19 @@ Json describeCharts(const Atlas& atlas) {
   for (std::size_t i = 0; i < atlas.charts.size(); ++i) {
     const Chart& chart = atlas.charts[i];
     const Surface& surface = atlas.surfaces[static_cast<std::size_t>(chart.surface)];
-    rows.push_back({surface.page, surface.instance, surface.primitive, chart.texelsPerMeter, triangles[i]});
+    rows.push_back({surface.page, surface.instance, surface.primitive, chart.texelsPerMeter, triangles[i],
+                    chart.key != 0 ? Json(hexOf(chart.key)) : Json(nullptr), chart.quarterTurns, chart.x, chart.y});
   }
-  return {{"columns", {"page", "instance", "primitive", "texelsPerMeter", "triangles"}}, {"rows", std::move(rows)}};
+  return {{"columns", chartColumns()}, {"rows", std::move(rows)}};
+}
+
+/// What a later bake needs to keep charts where they are (with the list of charts). Null without generated charts.
+Json describeLayout(const Atlas& atlas, const AtlasOptions& options) {
+  if (!(atlas.chartDensity > 0)) return nullptr;
+  return {{"chartDensity", atlas.chartDensity},     {"scale", atlas.chartScale},
+          {"firstPage", atlas.sceneUvPages},        {"pageSize", options.pageSize},
+          {"padding", options.padding},             {"blockAlign", options.blockAlign},
+          {"maxStretch", options.maxStretch}};
 }
 
 Json describeSceneUvs(const AtlasReport& report) {
@@ -129,6 +148,12 @@ Json describeRun(const BakeStats& stats, const BakeRecord& record) {
 
 }  // namespace
 
+const std::vector<std::string>& chartColumns() {
+  static const std::vector<std::string> columns = {"page", "instance",     "primitive", "texelsPerMeter", "triangles",
+                                                   "key",  "quarterTurns", "x",         "y"};
+  return columns;
+}
+
 std::string describeBake(const Scene& scene, const AtlasResult& atlas, const BakeResult& result,
                          const BakeRecord& record) {
   std::vector<std::string> warnings = scene.report.warnings;
@@ -146,7 +171,8 @@ std::string describeBake(const Scene& scene, const AtlasResult& atlas, const Bak
                    {"generatedCharts", atlas.report.generatedCharts},
                    {"nonManifoldEdges", atlas.report.nonManifoldEdges},
                    {"degenerateTriangles", atlas.report.degenerateTriangles},
-                   {"sceneUvs", describeSceneUvs(atlas.report)}};
+                   {"sceneUvs", describeSceneUvs(atlas.report)},
+                   {"layout", describeLayout(atlas.atlas, record.atlasOptions)}};
   json["pages"] = describePages(atlas.atlas, result);
   json["cost"] = {
       {"texels", result.stats.texels}, {"rays", result.stats.rays}, {"shadowRays", result.stats.shadowRays}};

@@ -7,6 +7,10 @@
 
 namespace lumel {
 
+/// What a row of "charts" holds: page, object, density, number of triangles; then, for --layout-from, a key that stands
+/// for the object's name and the chart's triangles (null with the scene's own UVs), and where the chart's box lies.
+const std::vector<std::string>& chartColumns();
+
 /// Settings as resolved, conventions, pages, charts, what the scene's own UVs were found to be, error figures and,
 /// under "run", what differs from run to run: times, threads, memory.
 std::string describeBake(const Scene& scene, const AtlasResult& atlas, const BakeResult& result,

@@ -98,7 +98,10 @@ class AtlasBuilder {
     double area = 0;
     for (const int i : generated_) area += weightedArea(scene_, scene_.instances[static_cast<std::size_t>(i)]);
     const bool search = !(options_.texelsPerMeter > 0);
-    const double density = search ? guessDensity(area, options_.pageSize) : static_cast<double>(options_.texelsPerMeter);
+    const RememberedLayout* earlier = usableLayout();
+    const double density = earlier  ? earlier->chartDensity
+                           : search ? guessDensity(area, options_.pageSize)
+                                    : static_cast<double>(options_.texelsPerMeter);
     if (!(area > 0) || !std::isfinite(density)) return {};  // nothing has a surface
 
     const auto chartStart = Clock::now();
@@ -114,43 +117,83 @@ class AtlasBuilder {
     report.chartSeconds = secondsSince(chartStart);
 
     const auto packStart = Clock::now();
-    Expected<ChartPlaces> places = placeCharts(objects, options_, sceneDensity_ / density, progress_);
+    const std::vector<std::uint64_t> keys = chartKeys(scene_, objects);
+    KeptLayout kept;
+    if (earlier) kept = {earlier->scale, recall(*earlier, keys)};
+    Expected<ChartPlaces> places =
+        placeCharts(objects, options_, sceneDensity_ / density, earlier ? &kept : nullptr, progress_);
     if (!places) return places.error();
     report.packSeconds = secondsSince(packStart);
     result_.atlas.texelsPerMeter = static_cast<float>(density * places->scale);
+    result_.atlas.chartDensity = density;
+    result_.atlas.chartScale = places->scale;
+    result_.atlas.sceneUvPages = static_cast<int>(result_.atlas.pages.size());
     for (const LayoutUse& use : objects.uses) {
       const Unwrapped& unwrapped = objects.layouts[use.layout].unwrapped;
       report.nonManifoldEdges += unwrapped.nonManifoldEdges;
       report.degenerateTriangles += unwrapped.degenerateTriangles;
       report.generatedCharts += unwrapped.charts.size();
     }
-    takePlaces(objects, *places);
+    takePlaces(objects, *places, keys);
+    if (earlier && report.keptCharts == 0 && !earlier->charts.empty())
+      report.warnings.push_back("the earlier layout holds no chart of this scene: all charts are placed anew");
     return {};
   }
 
-  void takePlaces(const ObjectLayouts& objects, const ChartPlaces& places) {
+  /// The earlier layout, if it was made by the same rules.
+  const RememberedLayout* usableLayout() {
+    if (!options_.layout) return nullptr;
+    const RememberedLayout& earlier = *options_.layout;
+    const auto isClose = [](double a, double b) { return std::abs(a - b) <= 1e-6 * b; };
+    const char* differs = earlier.pageSize != options_.pageSize       ? "page size"
+                          : earlier.padding != options_.padding       ? "padding"
+                          : earlier.blockAlign != options_.blockAlign ? "block alignment"
+                          : earlier.maxStretch != options_.maxStretch ? "stretch limit"
+                          : options_.texelsPerMeter > 0 &&
+                                  !isClose(earlier.chartDensity * earlier.scale, static_cast<double>(options_.texelsPerMeter))
+                              ? "texel density"
+                              : nullptr;
+    if (!differs) return &earlier;
+    result_.report.warnings.push_back(std::string("the earlier layout has another ") + differs +
+                                      ": all charts are placed anew");
+    return nullptr;
+  }
+
+  void takePlaces(const ObjectLayouts& objects, const ChartPlaces& places, const std::vector<std::uint64_t>& keys) {
     Atlas& atlas = result_.atlas;
     const int firstPage = static_cast<int>(atlas.pages.size());
     for (const auto& size : places.pages) atlas.pages.push_back({size[0], size[1]});
     std::size_t shape = 0;
+    double keptTexels = 0, texels = 0;
     for (const LayoutUse& use : objects.uses) {
       const ObjectLayout& layout = objects.layouts[use.layout];
       const Instance& instance = scene_.instances[static_cast<std::size_t>(use.instance)];
       std::vector<PlacedTriangle>& placed = placed_[static_cast<std::size_t>(use.instance)];
       const bool mirrors = glm::determinant(Mat3(instance.worldFromObject)) < 0;
       for (const UnwrappedChart& chart : layout.unwrapped.charts) {
+        const std::uint64_t key = keys[shape];
         const ChartPlace& place = places.charts[shape++];
         const auto index = static_cast<std::uint32_t>(atlas.charts.size());
-        atlas.charts.push_back({-1, atlas.texelsPerMeter * instance.settings.texelDensityScale});
+        const double snap = std::sqrt(place.scale.x * place.scale.y) / (use.scale * places.scale);
+        atlas.charts.push_back({-1, atlas.texelsPerMeter * instance.settings.texelDensityScale * static_cast<float>(snap), key,
+                                place.quarterTurns, place.x, place.y});
+        if (place.kept) ++result_.report.keptCharts;
         const auto& size = places.pages[static_cast<std::size_t>(place.page)];
         for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
           const SourceTriangle& source = layout.source[chart.triangles[t]];
           PlacedTriangle triangle{source.primitive, source.triangle, firstPage + place.page, index, {}};
+          std::array<Vec2d, 3> corners;
           for (std::size_t k = 0; k < 3; ++k) {
             const Vec2d texel = place.apply(chart.uvs[chart.corners[t][k]]);
             const std::size_t corner = mirrors && k > 0 ? 3 - k : k;  // the soup was reversed
             triangle.uvs[corner] = Vec2(texel / Vec2d(size[0], size[1]));
+            corners[k] = texel;
           }
+          const Vec2d e1 = corners[1] - corners[0];
+          const Vec2d e2 = corners[2] - corners[0];
+          const double area = 0.5 * std::abs(e1.x * e2.y - e1.y * e2.x);
+          texels += area;
+          keptTexels += place.kept ? area : 0.0;
           placed.push_back(triangle);
         }
       }
@@ -158,6 +201,7 @@ class AtlasBuilder {
         return a.primitive != b.primitive ? a.primitive < b.primitive : a.triangle < b.triangle;
       });
     }
+    if (texels > 0) result_.report.keptShare = keptTexels / texels;
   }
 
   void makeAllSurfaces() {

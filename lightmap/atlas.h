@@ -1,10 +1,12 @@
 // Parameterization: which surfaces get a lightmap, their charts and their places on atlas pages.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "lightmap/layout_memory.h"
 #include "lightmap/surface.h"
 #include "scene/expected.h"
 #include "scene/progress.h"
@@ -24,7 +26,10 @@ struct AtlasOptions {
   int pageSize = 1024;          // texels on a side; a multiple of 4
   int padding = 2;              // texels between charts, at least, and to the page's border half of it
   float maxStretch = 1.25f;     // a chart is split where its largest singular value (relative to uniform) exceeds this
-  int blockAlign = 0;           // chart borders to multiples of this (4 for block compression); 0 = off
+  int blockAlign = 0;           // no block of so many texels a side holds two charts (4 for block compression); 0 = off
+  // An earlier layout: generated charts that did not change stay where they were, at the density of then. It is not used
+  // where density (if given), page size, padding, blocks or stretch are others now.
+  std::shared_ptr<const RememberedLayout> layout = {};
 };
 
 /// What a scene-supplied TEXCOORD_1 was found to be. Valid means: present, finite, in 0..1, and no texel covered twice.
@@ -44,6 +49,8 @@ struct AtlasReport {
   std::vector<UvReport> sceneUvs;
   std::vector<std::string> warnings;
   std::size_t generatedCharts = 0;
+  std::size_t keptCharts = 0;   // of these: where they were in AtlasOptions::layout
+  double keptShare = 0.0;       // of the surface with generated charts
   std::size_t nonManifoldEdges = 0;
   std::size_t degenerateTriangles = 0;  // placed as zero-area charts' worth of nothing: they get no texels
   double chartSeconds = 0.0;

@@ -12,22 +12,28 @@ std::uint64_t bitsFrom(int from) { return ~std::uint64_t{0} << from; }
 /// Bits [0, to) of a word, to in 1..64.
 std::uint64_t bitsUpTo(int to) { return ~std::uint64_t{0} >> (64 - to); }
 
+/// Calls change(word, bits) for the words of cells [x0, x1), with the bits that are meant.
+template <class Change>
+void forEachWord(std::uint64_t* words, int x0, int x1, Change&& change) {
+  if (x0 >= x1) return;
+  const int first = x0 >> 6;
+  const int last = (x1 - 1) >> 6;
+  for (int i = first; i <= last; ++i) {
+    std::uint64_t bits = ~std::uint64_t{0};
+    if (i == first) bits &= bitsFrom(x0 & 63);
+    if (i == last) bits &= bitsUpTo(((x1 - 1) & 63) + 1);
+    change(words[i], bits);
+  }
+}
+
 }  // namespace
 
 void Bitmap::setSpan(int y, int x0, int x1) {
-  if (x0 >= x1) return;
-  std::uint64_t* words = row(y);
-  const int first = x0 >> 6;
-  const int last = (x1 - 1) >> 6;
-  const std::uint64_t firstMask = bitsFrom(x0 & 63);
-  const std::uint64_t lastMask = bitsUpTo(((x1 - 1) & 63) + 1);
-  if (first == last) {
-    words[first] |= firstMask & lastMask;
-    return;
-  }
-  words[first] |= firstMask;
-  for (int i = first + 1; i < last; ++i) words[i] = ~std::uint64_t{0};
-  words[last] |= lastMask;
+  forEachWord(row(y), x0, x1, [](std::uint64_t& word, std::uint64_t bits) { word |= bits; });
+}
+
+void Bitmap::clearSpan(int y, int x0, int x1) {
+  forEachWord(row(y), x0, x1, [](std::uint64_t& word, std::uint64_t bits) { word &= ~bits; });
 }
 
 std::size_t Bitmap::count() const {

@@ -29,6 +29,8 @@ class Bitmap {
   void set(int x, int y) { row(y)[x >> 6] |= std::uint64_t{1} << (x & 63); }
   /// Sets cells [x0, x1) of row y.
   void setSpan(int y, int x0, int x1);
+  /// Clears cells [x0, x1) of row y.
+  void clearSpan(int y, int x0, int x1);
 
   std::size_t count() const;
   /// Equal for equal bitmaps; different ones differ but for chance.

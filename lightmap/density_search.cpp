@@ -5,6 +5,10 @@
 #include <limits>
 #include <optional>
 
+#include "lightmap/pack_shape.h"
+#include "lightmap/raster.h"
+#include "scene/parallel.h"
+
 namespace lumel {
 namespace {
 
@@ -13,18 +17,12 @@ class Placer {
   Placer(const ObjectLayouts& objects, const AtlasOptions& options, Progress& progress)
       : objects_(objects), options_(options), progress_(progress) {}
 
-  Expected<ChartPlaces> placeAt(double scale, bool onePage) {
+  Expected<ChartPlaces> placeAt(double scale, bool onePage, const KeptLayout* kept = nullptr) {
     ChartPlaces places;
     places.scale = scale;
-    std::vector<PackShape> shapes;
-    std::uint32_t group = 0;
-    for (const LayoutUse& use : objects_.uses) {
-      for (const UnwrappedChart& chart : objects_.layouts[use.layout].unwrapped.charts) {
-        places.charts.push_back(start(chart, use.scale * scale));
-        shapes.push_back(shapeOf(chart, places.charts.back(), group));
-      }
-      ++group;
-    }
+    std::vector<PackShape> shapes = makeShapes(scale, places.charts);
+    if (kept)
+      for (std::size_t i = 0; i < shapes.size(); ++i) shapes[i].keep = kept->charts[i];
     PackOptions pack;
     pack.pageSize = options_.pageSize;
     pack.maxPages = onePage ? 1 : 0;
@@ -39,6 +37,9 @@ class Placer {
       places.charts[i].page = placement.page;
       places.charts[i].quarterTurns = placement.quarterTurns;
       places.charts[i].offset = Vec2d(placement.offset);
+      places.charts[i].x = placement.x;
+      places.charts[i].y = placement.y;
+      places.charts[i].kept = placement.kept;
     }
     places.pages = std::move(packed->pages);
     return places;
@@ -74,13 +75,38 @@ class Placer {
   }
 
  private:
-  static ChartPlace start(const UnwrappedChart& chart, double scale) {
+  /// Every chart at the density, its borders on whole texels where that saves room, and where it starts from.
+  std::vector<PackShape> makeShapes(double scale, std::vector<ChartPlace>& places) const {
+    struct Source {
+      const UnwrappedChart* chart;
+      double scale;
+      std::uint32_t group;
+    };
+    std::vector<Source> sources;
+    for (std::size_t u = 0; u < objects_.uses.size(); ++u)
+      for (const UnwrappedChart& chart : objects_.layouts[objects_.uses[u].layout].unwrapped.charts)
+        sources.push_back({&chart, objects_.uses[u].scale * scale, static_cast<std::uint32_t>(u)});
+    places.resize(sources.size());
+    std::vector<PackShape> shapes(sources.size());
+    const GridSettings grid = gridSettings(options_.pageSize, options_.padding, options_.blockAlign);
+    parallelFor(sources.size(), 16, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) {
+        const Source& source = sources[i];
+        const PackShape plain = shapeOf(*source.chart, start(*source.chart, Vec2d(source.scale)), source.group);
+        places[i] = start(*source.chart, source.scale * snapFactors(plain, grid));
+        shapes[i] = shapeOf(*source.chart, places[i], source.group);
+      }
+    });
+    return shapes;
+  }
+
+  static ChartPlace start(const UnwrappedChart& chart, const Vec2d& scale) {
     ChartPlace place;
     place.scale = scale;
     Vec2d high(0.0);  // the chart's own coordinates start at 0
     for (const Vec2 uv : chart.uvs) high = glm::max(high, Vec2d(uv) * scale);
     // Centred in the whole texels that it needs: a chart of one texel's size lies in one texel, not across four.
-    const Vec2d cells = glm::max(Vec2d(std::ceil(high.x), std::ceil(high.y)), Vec2d(1.0));
+    const Vec2d cells = glm::max(glm::ceil(high - kTexelSnap), Vec2d(1.0));
     place.shift = Vec2d((cells.x - high.x) / 2, cells.y - (cells.y - high.y) / 2);
     return place;
   }
@@ -107,9 +133,16 @@ double guessDensity(double area, int pageSize) {
   return std::sqrt(kShare * pageSize * pageSize / area);
 }
 
-Expected<ChartPlaces> placeCharts(const ObjectLayouts& objects, const AtlasOptions& options, double mostScale, Progress& progress) {
+Expected<ChartPlaces> placeCharts(const ObjectLayouts& objects, const AtlasOptions& options, double mostScale,
+                                  const KeptLayout* kept, Progress& progress) {
   Placer placer(objects, options, progress);
-  return options.texelsPerMeter > 0 ? placer.placeAt(1.0, false) : placer.fillOnePage(mostScale > 0 ? mostScale : std::numeric_limits<double>::infinity());
+  const bool search = !(options.texelsPerMeter > 0);
+  if (kept) {
+    Expected<ChartPlaces> places = placer.placeAt(kept->scale, search, kept);
+    if (places || places.error().kind != ErrorKind::Usage) return places;
+  }
+  if (!search) return placer.placeAt(kept ? kept->scale : 1.0, false);
+  return placer.fillOnePage(mostScale > 0 ? mostScale : std::numeric_limits<double>::infinity());
 }
 
 }  // namespace lumel

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "lightmap/atlas.h"
@@ -19,13 +20,16 @@ double guessDensity(double area, int pageSize);
 /// page texel = placement(scale * (u, -v) + shift).
 struct ChartPlace {
   int page = 0;
-  double scale = 1.0;
+  Vec2d scale{1.0};  // differs by a few percent between the axes where borders were moved to whole texels
   Vec2d shift{0.0};
   int quarterTurns = 0;
   Vec2d offset{0.0};
+  int x = 0;  // of its box's corner, in texels
+  int y = 0;
+  bool kept = false;
 
   Vec2d apply(Vec2 uv) const {
-    Vec2d p(uv.x * scale + shift.x, -uv.y * scale + shift.y);
+    Vec2d p(uv.x * scale.x + shift.x, -uv.y * scale.y + shift.y);
     for (int i = 0; i < quarterTurns; ++i) p = Vec2d(-p.y, p.x);
     return p + offset;
   }
@@ -37,8 +41,16 @@ struct ChartPlaces {
   double scale = 1.0;                      // found: multiplies the density that objects were laid out for
 };
 
+/// Places that charts had before, and the scale of then. Where one page must hold all and does not with these places,
+/// there is a new search.
+struct KeptLayout {
+  double scale = 1.0;
+  std::vector<std::optional<KeptPlace>> charts;  // in the order of ChartPlaces::charts
+};
+
 /// `mostScale` bounds a searched density: what scene-supplied lightmaps beside it have. 0: no bound.
 /// Errors: Usage (a chart larger than a page; charts too many for one page at any density), Interrupted.
-Expected<ChartPlaces> placeCharts(const ObjectLayouts& objects, const AtlasOptions& options, double mostScale, Progress& progress);
+Expected<ChartPlaces> placeCharts(const ObjectLayouts& objects, const AtlasOptions& options, double mostScale,
+                                  const KeptLayout* kept, Progress& progress);
 
 }  // namespace lumel

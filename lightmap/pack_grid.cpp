@@ -92,10 +92,19 @@ void spread(std::span<Probe> probes) {
   std::copy(ordered.begin(), ordered.end(), probes.begin());
 }
 
+/// The cells around a mask, corners included.
+Bitmap rimOf(const Bitmap& mask) {
+  Bitmap rim = inflate(mask, 1);
+  for (int y = 0; y < mask.height(); ++y)
+    mask.forEachRun(y, [&](int x0, int x1) { rim.clearSpan(y + 1, x0 + 1, x1 + 1); });
+  return rim;
+}
+
 }  // namespace
 
 SearchMask searchMask(const Bitmap& mask) {
-  SearchMask search{mask.width(), mask.height(), {}, mask.hash()};
+  SearchMask search{mask.width(), mask.height(), {}, mask.hash(), rimOf(mask), 0};
+  search.rimCells = static_cast<int>(search.rim.count());
   std::vector<Bitmap> inside(1, mask);
   for (int level = 1; level < PackGrid::kSquareLevels; ++level) {
     Bitmap next = squaresInside(inside.back(), level);
@@ -122,13 +131,28 @@ PackGrid::PackGrid(int width, int height, int border)
   runs_.assign(kRunLevels, Level(size, 0));
   squares_.assign(kSquareLevels, Level(size, 0));
   squares_[0].clear();
+  freeCells_ = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   for (int y = 0; y < height; ++y) {
     std::uint64_t* words = row(runs_[0], y);
     for (int i = width / 64; i < stride_; ++i) words[i] = kAll;
     if (width % 64 != 0) words[width / 64] = kAll << (width % 64);
+    const bool isBorder = y < border || y >= height - border;
+    take(y, 0, isBorder ? width : std::min(border, width));
+    take(y, std::max(0, width - border), width);
   }
   updateLevels(0, stride_, 0, height);
-  freeCells_ = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+}
+
+void PackGrid::take(int y, int x0, int x1) {
+  std::uint64_t* words = row(runs_[0], y);
+  for (int x = x0; x < x1;) {
+    const int bit = x & 63;
+    const int count = std::min(64 - bit, x1 - x);
+    const std::uint64_t added = (kAll >> (64 - count)) << bit & ~words[x >> 6];
+    freeCells_ -= static_cast<std::size_t>(std::popcount(added));
+    words[x >> 6] |= added;
+    x += count;
+  }
 }
 
 void PackGrid::updateLevels(int firstWord, int lastWord, int firstRow, int lastRow) {
@@ -162,41 +186,100 @@ void PackGrid::updateLevels(int firstWord, int lastWord, int firstRow, int lastR
   }
 }
 
-bool PackGrid::findInRow(const SearchMask& mask, int y, std::vector<std::uint64_t>& free, int* x) const {
+bool PackGrid::findInRow(const SearchMask& mask, int y, FreeRow& free) const {
   const int begin = border_;
   const int end = width_ - border_ - mask.width + 1;  // positions [begin, end)
+  std::uint64_t* words = free.words.data();
   int low = begin >> 6;
   int high = (end - 1) >> 6;
-  for (int i = low; i <= high; ++i) free[static_cast<std::size_t>(i)] = kAll;
-  free[static_cast<std::size_t>(low)] &= kAll << (begin & 63);
-  free[static_cast<std::size_t>(high)] &= kAll >> (63 - ((end - 1) & 63));
+  for (int i = low; i <= high; ++i) words[i] = kAll;
+  words[low] &= kAll << (begin & 63);
+  words[high] &= kAll >> (63 - ((end - 1) & 63));
   for (const Probe& probe : mask.probes) {
     const Level& level = (probe.square ? squares_ : runs_)[probe.level];
     const std::uint64_t* taken = row(level, y + probe.dy) + (probe.dx >> 6);
     const int bit = probe.dx & 63;
     std::uint64_t any = 0;
     if (bit == 0) {
-      for (int i = low; i <= high; ++i) any |= free[static_cast<std::size_t>(i)] &= ~taken[i];
+      for (int i = low; i <= high; ++i) any |= words[i] &= ~taken[i];
     } else {
-      for (int i = low; i <= high; ++i)
-        any |= free[static_cast<std::size_t>(i)] &= ~((taken[i] >> bit) | (taken[i + 1] << (64 - bit)));
+      for (int i = low; i <= high; ++i) any |= words[i] &= ~((taken[i] >> bit) | (taken[i + 1] << (64 - bit)));
     }
     if (any == 0) return false;
-    while (free[static_cast<std::size_t>(low)] == 0) ++low;
-    while (free[static_cast<std::size_t>(high)] == 0) --high;
+    while (words[low] == 0) ++low;
+    while (words[high] == 0) --high;
   }
-  *x = low * 64 + std::countr_zero(free[static_cast<std::size_t>(low)]);
+  free.low = low;
+  free.high = high;
   return true;
 }
 
-std::optional<Cell> PackGrid::findFirst(const SearchMask& mask, int firstRow, int lastRow) const {
+/// 64 cells of a row from column x on, which may be -1; what lies off the page counts as taken.
+std::uint64_t PackGrid::cellsFrom(int x, int y) const {
+  if (y < 0 || y >= height_) return kAll;
+  const std::uint64_t* words = row(runs_[0], y);
+  if (x < 0) return words[0] << 1 | 1;
+  const int word = x >> 6;
+  const int bit = x & 63;
+  const auto read = [&](int i) { return i < stride_ ? words[i] : kAll; };
+  return bit == 0 ? read(word) : read(word) >> bit | read(word + 1) << (64 - bit);
+}
+
+int PackGrid::takenUnderRim(const SearchMask& mask, Cell cell) const {
+  int sum = 0;
+  for (int y = 0; y < mask.rim.height(); ++y) {
+    const std::uint64_t* rim = mask.rim.row(y);
+    for (int i = 0; i < mask.rim.wordsPerRow(); ++i)
+      if (rim[i] != 0) sum += std::popcount(rim[i] & cellsFrom(cell.x - 1 + 64 * i, cell.y - 1 + y));
+  }
+  return sum;
+}
+
+Fit PackGrid::mostContact(const SearchMask& mask, int y, const FreeRow& free) const {
+  constexpr int kMostTried = 64;
+  Fit best;
+  int most = -1;
+  int tried = 0;
+  const auto consider = [&](int x) {
+    ++tried;
+    const int taken = takenUnderRim(mask, {x, y});
+    if (taken <= most) return;
+    most = taken;
+    best.cell = {x, y};
+  };
+  for (int i = free.low; i <= free.high; ++i) {
+    // Only the ends of runs of positions have a neighbour at their side.
+    for (std::uint64_t bits = free.words[static_cast<std::size_t>(i)]; bits != 0; bits &= bits - 1) {
+      const int x = i * 64 + std::countr_zero(bits);
+      if (free.at(x - 1) && free.at(x + 1)) continue;
+      consider(x);
+      if (tried == kMostTried) break;
+    }
+    if (tried == kMostTried) break;
+  }
+  best.contact = static_cast<double>(most) / mask.rimCells;
+  return best;
+}
+
+std::optional<Fit> PackGrid::findLowest(const SearchMask& mask, int firstRow, int lastRow) const {
   if (mask.width > width_ - 2 * border_ || mask.height > height_ - 2 * border_) return std::nullopt;
-  std::vector<std::uint64_t> free(static_cast<std::size_t>(stride_));
-  int x = 0;
+  FreeRow free;
+  free.words.resize(static_cast<std::size_t>(stride_));
   const int last = std::min(lastRow, height_ - border_ - mask.height);
   for (int y = std::max(firstRow, border_); y <= last; ++y)
-    if (findInRow(mask, y, free, &x)) return Cell{x, y};
+    if (findInRow(mask, y, free)) return mostContact(mask, y, free);
   return std::nullopt;
+}
+
+bool PackGrid::fits(const SearchMask& mask, Cell cell) const {
+  if (cell.x < border_ || cell.y < border_) return false;
+  if (cell.x > width_ - border_ - mask.width || cell.y > height_ - border_ - mask.height) return false;
+  for (const Probe& probe : mask.probes) {
+    const Level& level = (probe.square ? squares_ : runs_)[probe.level];
+    const int x = cell.x + probe.dx;
+    if ((row(level, cell.y + probe.dy)[x >> 6] >> (x & 63)) & 1) return false;
+  }
+  return true;
 }
 
 void PackGrid::insert(const Bitmap& taken, int x, int y) {
@@ -205,19 +288,8 @@ void PackGrid::insert(const Bitmap& taken, int x, int y) {
   const int firstCell = std::max(0, x);
   const int lastCell = std::min(width_, x + taken.width());
   if (firstRow >= lastRow || firstCell >= lastCell) return;
-  for (int cellY = firstRow; cellY < lastRow; ++cellY) {
-    std::uint64_t* words = row(runs_[0], cellY);
-    taken.forEachRun(cellY - y, [&](int x0, int x1) {
-      for (int cell = std::max(0, x0 + x); cell < std::min(width_, x1 + x);) {
-        const int bit = cell & 63;
-        const int count = std::min(64 - bit, std::min(width_, x1 + x) - cell);
-        const std::uint64_t added = (kAll >> (64 - count)) << bit & ~words[cell >> 6];
-        freeCells_ -= static_cast<std::size_t>(std::popcount(added));
-        words[cell >> 6] |= added;
-        cell += count;
-      }
-    });
-  }
+  for (int cellY = firstRow; cellY < lastRow; ++cellY)
+    taken.forEachRun(cellY - y, [&](int x0, int x1) { take(cellY, std::max(0, x0 + x), std::min(width_, x1 + x)); });
   updateLevels(firstCell >> 6, ((lastCell - 1) >> 6) + 1, firstRow, lastRow);
 }
 

@@ -26,6 +26,8 @@ struct SearchMask {
   int height = 0;
   std::vector<Probe> probes;
   std::uint64_t hash = 0;  // of the bitmap
+  Bitmap rim;              // the cells around the mask; its cell (x, y) is the mask's (x - 1, y - 1)
+  int rimCells = 0;
 };
 
 SearchMask searchMask(const Bitmap& mask);
@@ -33,6 +35,12 @@ SearchMask searchMask(const Bitmap& mask);
 struct Cell {
   int x = 0;
   int y = 0;
+};
+
+/// A place where a mask fits, and how much of its rim lies on taken cells (0 to 1): what touches leaves no gaps.
+struct Fit {
+  Cell cell;
+  double contact = 0.0;
 };
 
 /// Occupancy with summaries: for each level k, and each cell, whether any of the 2^k cells to its right, or of the
@@ -46,8 +54,12 @@ class PackGrid {
   int width() const { return width_; }
   int height() const { return height_; }
 
-  /// The lowest row y in [firstRow, lastRow], and in it the lowest x, where the mask touches no taken cell.
-  std::optional<Cell> findFirst(const SearchMask& mask, int firstRow, int lastRow) const;
+  /// The lowest row y in [firstRow, lastRow] where the mask touches no taken cell, and in it the place with the most
+  /// contact (of the first 64 that have something beside them; the leftmost of equals).
+  std::optional<Fit> findLowest(const SearchMask& mask, int firstRow, int lastRow) const;
+
+  /// Whether the mask touches no taken cell there. Any cell may be asked for.
+  bool fits(const SearchMask& mask, Cell cell) const;
 
   /// Takes the cells of `taken` with its corner at (x, y); parts outside the page are cut off.
   void insert(const Bitmap& taken, int x, int y);
@@ -66,8 +78,21 @@ class PackGrid {
   const std::uint64_t* row(const Level& level, int y) const {
     return level.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(stride_);
   }
+  /// Positions of a row where a mask fits: bits of the words [low, high].
+  struct FreeRow {
+    std::vector<std::uint64_t> words;
+    int low = 0;
+    int high = 0;
+    bool at(int x) const {
+      return x >> 6 >= low && x >> 6 <= high && ((words[static_cast<std::size_t>(x >> 6)] >> (x & 63)) & 1) != 0;
+    }
+  };
+  void take(int y, int x0, int x1);
   void updateLevels(int firstWord, int lastWord, int firstRow, int lastRow);
-  bool findInRow(const SearchMask& mask, int y, std::vector<std::uint64_t>& free, int* x) const;
+  bool findInRow(const SearchMask& mask, int y, FreeRow& free) const;
+  Fit mostContact(const SearchMask& mask, int y, const FreeRow& free) const;
+  int takenUnderRim(const SearchMask& mask, Cell cell) const;
+  std::uint64_t cellsFrom(int x, int y) const;
 
   int width_;
   int height_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <limits>
 
 #include "scene/parallel.h"
@@ -68,33 +69,46 @@ std::vector<Step> stepsOf(std::span<const GridShape> shapes, const std::vector<s
 }  // namespace
 
 std::optional<Place> PagePacker::findPlace(const GridShape& shape, Stance stance) {
-  constexpr int kNone = std::numeric_limits<int>::max();
-  int bestTop = kNone;
-  Place best;
+  double bestScore = std::numeric_limits<double>::infinity();
+  std::optional<Place> best;
   for (std::size_t i = 0; i < shape.orientations.size(); ++i) {
     const SearchMask& mask = shape.orientations[i].mask;
     if (!hasStance(mask, stance)) continue;
+    // Contact all around is worth the shorter side: half a chart sunk into what is there.
+    const double worth = std::min(mask.width, mask.height);
+    const double reach = bestScore + worth - mask.height;
+    const int lastRow = reach < grid_.height() ? static_cast<int>(std::ceil(reach)) - 1 : grid_.height();
     // Cells are never given back, so where this very mask did not fit before it does not fit now.
     int& firstRow = firstRow_[mask.hash];
-    const int lastRow = bestTop == kNone ? grid_.height() : bestTop - 1 - mask.height;
-    const auto cell = grid_.findFirst(mask, firstRow, lastRow);
-    firstRow = std::max(firstRow, cell ? cell->y : lastRow + 1);
-    if (!cell) continue;
-    bestTop = cell->y + mask.height;
-    best = {static_cast<int>(i), *cell};
+    const auto fit = grid_.findLowest(mask, firstRow, lastRow);
+    firstRow = std::max(firstRow, fit ? fit->cell.y : lastRow + 1);
+    if (!fit) continue;
+    const double score = fit->cell.y + mask.height - worth * fit->contact;
+    if (score >= bestScore) continue;
+    bestScore = score;
+    best = {static_cast<int>(i), fit->cell};
   }
-  return bestTop == kNone ? std::nullopt : std::optional(best);
+  return best;
 }
 
 std::optional<Place> PagePacker::place(const GridShape& shape, Stance stance) {
   std::optional<Place> place = findPlace(shape, stance);
   if (!place && stance != Stance::Any) place = findPlace(shape, Stance::Any);
-  if (!place) return std::nullopt;
-  const int turns = shape.orientations[static_cast<std::size_t>(place->orientation)].quarterTurns;
-  const Taken taken = takenBy(shape, turns, settings_);
-  grid_.insert(taken.cells, place->cell.x - taken.margin, place->cell.y - taken.margin);
-  covered_ += shape.cells;
+  if (place) take(shape, *place);
   return place;
+}
+
+bool PagePacker::placeAt(const GridShape& shape, const Place& place) {
+  if (!grid_.fits(shape.orientations[static_cast<std::size_t>(place.orientation)].mask, place.cell)) return false;
+  take(shape, place);
+  return true;
+}
+
+void PagePacker::take(const GridShape& shape, const Place& place) {
+  const int turns = shape.orientations[static_cast<std::size_t>(place.orientation)].quarterTurns;
+  const Taken taken = takenBy(shape, turns, settings_);
+  grid_.insert(taken.cells, place.cell.x - taken.margin, place.cell.y - taken.margin);
+  covered_ += shape.cells;
 }
 
 double PagePacker::coverage() const {

@@ -25,14 +25,18 @@ class PagePacker {
   PagePacker(const GridSettings& settings, int width, int height)
       : settings_(settings), grid_(width, height, settings.border) {}
 
-  /// Puts the shape where its upper edge comes lowest, in an orientation of the stance if it fits in one of them.
-  /// Nothing: it fits nowhere.
+  /// Puts the shape where its upper edge comes lowest, the lower for touching what is there, in an orientation of the
+  /// stance if it fits in one of them. Nothing: it fits nowhere.
   std::optional<Place> place(const GridShape& shape, Stance stance = Stance::Any);
+
+  /// Puts it there, if it fits.
+  bool placeAt(const GridShape& shape, const Place& place);
 
   std::size_t freeCells() const { return grid_.freeCells(); }
   double coverage() const;
 
  private:
+  void take(const GridShape& shape, const Place& place);
   std::optional<Place> findPlace(const GridShape& shape, Stance stance);
 
   GridSettings settings_;

@@ -93,18 +93,28 @@ Bitmap turned(const Bitmap& texels, int quarterTurns) {
   return result;
 }
 
+/// The blocks of a bitmap whose margin begins on one.
+Bitmap blocksOf(const Bitmap& texels, const GridSettings& settings) {
+  return coarsen(inflate(texels, settings.margin), settings.block, 0, 0);
+}
+
+/// Cells that no other shape's room may share: texels grown by half the padding cannot overlap another shape's; blocks
+/// have their margin.
+std::size_t roomOf(const Bitmap& texels, const GridSettings& settings) {
+  return settings.block > 1 ? blocksOf(texels, settings).count() : inflate(texels, settings.padding / 2).count();
+}
+
 void makeOrientations(bool mayRotate, const GridSettings& settings, GridShape& shape) {
   Bitmap texels = shape.texels;
   for (int turn = 0; turn < (mayRotate ? 4 : 1); ++turn) {
     if (turn > 0) texels = quarterTurn(texels);
-    const Bitmap cells = settings.block > 1 ? coarsen(texels, settings.block, 0, 0) : texels;
+    const Bitmap cells = settings.block > 1 ? blocksOf(texels, settings) : texels;
     SearchMask mask = searchMask(cells);
     const bool known = std::any_of(shape.orientations.begin(), shape.orientations.end(),
                                    [&](const Orientation& o) { return o.mask.hash == mask.hash; });
     if (turn == 0) {
       shape.cells = cells.count();
-      // Texels grown by half the padding cannot overlap another shape's; blocks cannot as they are.
-      shape.room = settings.block > 1 ? shape.cells : inflate(texels, settings.padding / 2).count();
+      shape.room = roomOf(texels, settings);
     }
     if (!known) shape.orientations.push_back({turn, std::move(mask)});
   }
@@ -112,12 +122,57 @@ void makeOrientations(bool mayRotate, const GridSettings& settings, GridShape& s
 
 }  // namespace
 
+GridSettings gridSettings(int pageSize, int padding, int blockAlign) {
+  GridSettings settings;
+  settings.block = std::max(1, blockAlign);
+  settings.padding = std::max(0, padding);
+  const int half = (settings.padding + 1) / 2;
+  (settings.block > 1 ? settings.margin : settings.border) = half;
+  settings.pageCells = pageSize / settings.block;
+  return settings;
+}
+
 std::vector<GridShape> rasteriseShapes(std::span<const PackShape> sources) {
   std::vector<GridShape> shapes(sources.size());
   parallelFor(sources.size(), 16, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) rasterise(sources[i], shapes[i]);
   });
   return shapes;
+}
+
+Vec2d snapFactors(const PackShape& source, const GridSettings& settings) {
+  const Box box = boxOf(source);
+  if (!box.hasArea) return Vec2d(1.0);
+  const Vec2d extent = box.high - box.low;
+  const auto factor = [&settings](double side) {
+    const double around = 2.0 * settings.margin;
+    const double whole = std::floor((side + around) / settings.block) * settings.block - around;
+    const bool isSmall = whole >= 1 && whole < side - kTexelSnap && whole >= (1 - kMostSnap) * side;
+    return isSmall ? whole / side : 1.0;
+  };
+  const Vec2d factors(factor(extent.x), factor(extent.y));
+  const auto roomAt = [&](const Vec2d& scale) {
+    PackShape scaled = source;
+    for (auto& triangle : scaled.triangles)
+      for (Vec2& p : triangle) p = Vec2(Vec2d(p) * scale);
+    GridShape shape;
+    rasterise(scaled, shape);
+    return shape.texels.empty() ? 0.0 : static_cast<double>(roomOf(shape.texels, settings));
+  };
+  Vec2d best(1.0);
+  double gain = 0;
+  double room = 0;
+  for (const Vec2d scale : {Vec2d(factors.x, 1), Vec2d(1, factors.y), factors}) {
+    if (scale == Vec2d(1.0)) continue;
+    if (room == 0) room = roomAt(Vec2d(1.0));
+    if (room == 0) return best;  // larger than any page: refused later
+    const double saved = 1 - roomAt(scale) / room;
+    const double lost = 1 - scale.x * scale.y;
+    if (saved - lost <= gain) continue;
+    gain = saved - lost;
+    best = scale;
+  }
+  return best;
 }
 
 void addOrientations(std::span<const PackShape> sources, const GridSettings& settings, std::vector<GridShape>& shapes) {
@@ -128,11 +183,9 @@ void addOrientations(std::span<const PackShape> sources, const GridSettings& set
 }
 
 Taken takenBy(const GridShape& shape, int quarterTurns, const GridSettings& settings) {
-  const Bitmap grown = inflate(turned(shape.texels, quarterTurns), settings.padding);
-  if (settings.block == 1) return {grown, settings.padding};
-  const int margin = (settings.padding + settings.block - 1) / settings.block;
-  const int origin = margin * settings.block - settings.padding;
-  return {coarsen(grown, settings.block, origin, origin), margin};
+  const Bitmap texels = turned(shape.texels, quarterTurns);
+  if (settings.block > 1) return {blocksOf(texels, settings), 0};
+  return {inflate(texels, settings.padding), settings.padding};
 }
 
 }  // namespace lumel

@@ -14,7 +14,8 @@ inline constexpr int kLargestPage = 32767;
 
 struct GridSettings {
   int block = 1;      // texels per cell side
-  int border = 0;     // cells
+  int border = 0;     // cells kept free at the page's sides
+  int margin = 0;     // texels around a shape that belong to its cells, where cells are blocks
   int padding = 0;    // texels
   int pageCells = 0;  // on a side
 };
@@ -34,8 +35,18 @@ struct GridShape {
   std::vector<Orientation> orientations;
 };
 
+/// Where cells are blocks, half of the padding goes with each shape as a margin: then shapes on different blocks are
+/// far enough apart, and from the page's border too.
+GridSettings gridSettings(int pageSize, int padding, int blockAlign);
+
 /// Bitmaps of all shapes, in parallel; the orientations are left out (shapes larger than a page can be refused first).
 std::vector<GridShape> rasteriseShapes(std::span<const PackShape> sources);
+
+/// Factors, at most 1, by which a shape becomes smaller along x and y so that its box ends on whole texels (with its
+/// margin on whole blocks), where that saves a larger share of its room on the page than of its surface. A side changes
+/// by kMostSnap at most.
+Vec2d snapFactors(const PackShape& source, const GridSettings& settings);
+inline constexpr double kMostSnap = 0.08;
 
 void addOrientations(std::span<const PackShape> sources, const GridSettings& settings, std::vector<GridShape>& shapes);
 

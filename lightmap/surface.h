@@ -41,6 +41,11 @@ struct Chart {
   int surface = 0;  // the first with a triangle of it; others may follow: of the same instance and page
   // May differ per chart where it was snapped or scaled per object.
   float texelsPerMeter = 0.0f;
+  // Of generated charts, for the next bake's layout (layout_memory.h); key 0: came with the scene's UVs.
+  std::uint64_t key = 0;
+  int quarterTurns = 0;
+  int x = 0;  // of its box's corner on its page, in texels
+  int y = 0;
 };
 
 struct Atlas {
@@ -48,6 +53,9 @@ struct Atlas {
   std::vector<Page> pages;
   std::vector<Chart> charts;
   float texelsPerMeter = 0.0f;  // nominal density, as given or as found to fill the page; 0 with scene UVs alone
+  double chartDensity = 0.0;    // that generated charts were made for, before they were scaled to it by chartScale
+  double chartScale = 1.0;
+  int sceneUvPages = 0;         // the first pages hold the scene's own lightmap UVs
 };
 
 }  // namespace lumel

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "lightmap/pack_shape.h"
 #include "scene/parallel.h"
 
 namespace lumel {
@@ -144,7 +145,11 @@ TEST(Pack, ShapesKeepTheirPaddingOnEveryPage) {
     for (std::size_t page = 0; page < result.pages.size(); ++page) {
       int toBorder = 100;
       const int gap = leastGap(owners[page], result.pages[page][0], result.pages[page][1], padding + 2, &toBorder);
-      EXPECT_EQ(gap, padding) << "dense packing has a pair at exactly the padding, page " << page;
+      EXPECT_GE(gap, padding) << "page " << page;
+      const bool isDense = page + 1 < result.pages.size();
+      if (isDense) {
+        EXPECT_EQ(gap, padding) << "a dense page has a pair at exactly the padding";
+      }
       EXPECT_GE(toBorder, (padding + 1) / 2);
     }
     for (const Placement& placement : result.placements) EXPECT_GE(placement.page, 0);
@@ -174,14 +179,61 @@ TEST(Pack, BlocksHoldOneShapeEach) {
   }
 }
 
-TEST(Pack, BlockAlignedShapesStartOnBlocks) {
+TEST(Pack, BlockAlignedShapesStartOnBlocksWithTheirMargin) {
   const std::vector<PackShape> shapes(9, rectangle(6, 9));
-  const PackResult result = pack(shapes, {.pageSize = 64, .padding = 1, .blockAlign = 4});
-  for (const Placement& p : result.placements) {
-    const Vec2 a = p.apply(Vec2(0, 0)), b = p.apply(Vec2(6, 9));
-    EXPECT_EQ(std::fmod(std::min(a.x, b.x), 4.0f), 0.0f);
-    EXPECT_EQ(std::fmod(std::min(a.y, b.y), 4.0f), 0.0f);
+  for (const int padding : {0, 1, 2, 3}) {
+    const PackResult result = pack(shapes, {.pageSize = 64, .padding = padding, .blockAlign = 4});
+    const float margin = static_cast<float>((padding + 1) / 2);
+    for (const Placement& p : result.placements) {
+      const Vec2 a = p.apply(Vec2(0, 0)), b = p.apply(Vec2(6, 9));
+      EXPECT_EQ(std::fmod(std::min(a.x, b.x) - margin, 4.0f), 0.0f);
+      EXPECT_EQ(std::fmod(std::min(a.y, b.y) - margin, 4.0f), 0.0f);
+    }
   }
+}
+
+TEST(Pack, BlocksFillAPageWhereShapesLeaveRoomForThePadding) {
+  // 14 texels and a gutter of 2 are four blocks: 64 of them fill the page to the last block.
+  const std::vector<PackShape> shapes(64, rectangle(14, 14));
+  const PackResult result = pack(shapes, {.pageSize = 128, .maxPages = 1, .padding = 2, .blockAlign = 4});
+  for (const Placement& p : result.placements) EXPECT_EQ(p.page, 0);
+}
+
+TEST(Pack, OfPlacesInOneRowTheOneThatTouchesMostIsTaken) {
+  // A comb over the whole page with a slot of ten texels and one of six.
+  PackShape comb = rectangle(64, 4, Vec2(0, 10));
+  for (const auto& [x, width] : {std::pair{0.0f, 4.0f}, {14.0f, 4.0f}, {24.0f, 40.0f}}) {
+    const PackShape tooth = rectangle(width, 10, Vec2(x, 0));
+    comb.triangles.insert(comb.triangles.end(), tooth.triangles.begin(), tooth.triangles.end());
+  }
+  comb.mayRotate = false;
+  const std::vector<PackShape> shapes = {comb, rectangle(6, 6)};
+  const PackResult result = pack(shapes, {.pageSize = 64, .padding = 0, .shrinkLast = false});
+  EXPECT_EQ(result.placements[1].apply(Vec2(3, 3)), Vec2(21, 3));
+}
+
+TEST(SnapFactors, MakeARectangleWholeWhereThatSavesRoom) {
+  const GridSettings grid = gridSettings(64, 2, 0);
+  const Vec2d both = snapFactors(rectangle(14.3f, 20.7f), grid);
+  EXPECT_NEAR(both.x * 14.3, 14.0, 1e-5);
+  EXPECT_NEAR(both.y * 20.7, 20.0, 1e-5);
+  EXPECT_EQ(snapFactors(rectangle(14.0f, 20.0f), grid), Vec2d(1.0));
+  EXPECT_EQ(snapFactors(rectangle(1.3f, 0.4f), grid), Vec2d(1.0)) << "a quarter off is too much";
+  EXPECT_EQ(snapFactors(rectangle(0.0f, 20.7f), grid), Vec2d(1.0));
+}
+
+TEST(SnapFactors, LeaveShapesWithoutStraightSidesAlone) {
+  const Vec2 a(0, 15.1f), b(15.1f, 0), c(30.2f, 15.1f), d(15.1f, 30.2f);
+  const PackShape diamond = {{Triangle{a, b, c}, Triangle{a, c, d}}, 0, true};
+  const Vec2d factors = snapFactors(diamond, gridSettings(64, 2, 0));
+  // A texel less at two corners is worth no more than the diamond's own shrinking.
+  EXPECT_GT(factors.x * factors.y, 0.98);
+}
+
+TEST(SnapFactors, LeaveRoomForTheMarginOnBlocks) {
+  const Vec2d factors = snapFactors(rectangle(14.5f, 30.9f), gridSettings(64, 2, 4));
+  EXPECT_NEAR(factors.x * 14.5, 14.0, 1e-5);
+  EXPECT_NEAR(factors.y * 30.9, 30.0, 1e-5);
 }
 
 TEST(Pack, SameForAnyThreadCount) {
