@@ -143,6 +143,7 @@ Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const R
                                         std::vector<BakedPage>& pages, Progress& progress) {
   GatherIntegrator integrator(transport, kernels, atlas, texels,
                               {.samples = std::max(1, options.samples),
+                               .maxSamples = options.maxSamples,
                                .bounces = options.bounces,
                                .seed = options.seed,
                                .targetError = options.targetError,

@@ -26,10 +26,13 @@ inline constexpr int kAllBounces = -1;
 
 struct BakeOptions {
   Integrator integrator = Integrator::Gather;
-  int samples = 256;          // gather rays per texel; rounded up to a power of two would waste: any count >= 1
+  int samples =
+      256;  // gather rays per texel, any count >= 1; with a target error the least, with a time budget the most
   int bounces = kAllBounces;  // indirect bounces; 0 = direct light only
-  // Gather alone: sampling ends where the relative standard error is met at 95% of the texels; 0: `samples` for all.
+  // Gather alone: sampling goes on until the relative standard error of the flat map is so small at 95% of the texels,
+  // or `maxSamples` are taken; texels darker than a tenth of the mean are judged as if they were so bright. 0: off.
   float targetError = 0.0f;
+  int maxSamples = 16384;
   // Gather alone: no pass is begun that would end later than this; 0: none. The only option whose result depends on
   // the machine.
   float timeBudgetSeconds = 0.0f;
@@ -65,8 +68,8 @@ struct BakeResult {
   BakeStats stats;
 };
 
-/// Finds the light at every covered texel. The result depends on scene, atlas and options alone, bit for bit, never on the
-/// number of threads. Errors: Failed (Embree, memory), Interrupted.
+/// Finds the light at every covered texel. The result depends on scene, atlas and options alone, bit for bit, never on
+/// the number of threads. Errors: Failed (Embree, memory), Interrupted.
 Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
                           const BakeOptions& options, Progress& progress);
 

@@ -29,8 +29,8 @@ enum class Quality { Draft, Preview, Production };
 constexpr std::array<int, 3> kQualitySamples = {16, 64, 256};
 /// Auto: where --quality asks for less than production.
 enum class Denoise { Auto, On, Off };
-/// Most samples where a target error is given and --samples is not.
-constexpr int kMostSamples = 16384;
+/// Least samples where a target error is given and --samples is not: the first at which an error is known well enough.
+constexpr int kLeastSamples = 32;
 
 struct BakeArguments {
   fs::path scene;
@@ -75,10 +75,14 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
   options.choice("integrator", a.bake.integrator, {"gather", "path"},
                  "Light from other texels (gather), or every path to its end: unbiased and slow (path)");
   options.choice("quality", a.quality, {"draft", "preview", "production"}, "16, 64 or 256 samples");
-  options.integer("samples", a.samples, {1, 1 << 24}, "Gather rays per texel; with --target-error at most")
-      .defaultText = "by --quality; 16384 with --target-error";
+  options.integer("samples", a.samples, {1, 1 << 24}, "Gather rays per texel; with --target-error the least")
+      .defaultText = "by --quality; 32 with --target-error";
   options.number("target-error", a.bake.targetError, {0.0f, 1.0f},
-                 "Sample each part of a page until its relative standard error is so small (0.01: 1%); 0: off");
+                 "Sample each part of a page until the relative standard error of its light is so small (0.01: 1%); "
+                 "done when 95% of the texels are. Texels darker than a tenth of the mean count as so bright. 0: off, "
+                 "the same number of rays everywhere");
+  options.integer("max-samples", a.bake.maxSamples, {1, 1 << 24},
+                  "Most gather rays per texel with --target-error, whether it is met or not");
   options.number("time-budget", a.bake.timeBudgetSeconds, {0.0f},
                  "Begin no pass that would end later than so many seconds of gathering; 0: none. The result then "
                  "depends on the machine");
@@ -124,6 +128,9 @@ Expected<void> check(const BakeArguments& a) {
     return usageError("--page-size: " + std::to_string(a.atlas.pageSize) + " is not a multiple of 4");
   if (a.bake.integrator == Integrator::Path && (a.bake.targetError > 0.0f || a.bake.timeBudgetSeconds > 0.0f))
     return usageError("--target-error and --time-budget work with --integrator gather alone; give --samples");
+  if (a.bake.targetError > 0.0f && a.samples > a.bake.maxSamples)
+    return usageError("--samples " + std::to_string(a.samples) + " is more than --max-samples " +
+                      std::to_string(a.bake.maxSamples));
   if (!a.sky.empty() && a.skyColor != Vec3(0.0f))
     return usageError("--sky and --sky-color: give one of them; --sky-strength scales either");
   return {};
@@ -192,7 +199,8 @@ void printSummary(const fs::path& output, const AtlasResult& atlas, const BakeRe
 
 int samplesOf(const BakeArguments& a) {
   if (a.samples > 0) return a.samples;
-  return a.bake.targetError > 0.0f ? kMostSamples : kQualitySamples[static_cast<std::size_t>(a.quality)];
+  return a.bake.targetError > 0.0f ? std::min(kLeastSamples, a.bake.maxSamples)
+                                   : kQualitySamples[static_cast<std::size_t>(a.quality)];
 }
 
 bool denoises(const BakeArguments& a) {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 
 #include "scene/parallel.h"
 
@@ -13,7 +12,7 @@ namespace lumel {
 namespace {
 
 constexpr std::uint32_t kFirstPass = 8;
-/// Fewest samples after which an error estimate may end the work on a texel: two doublings, so that a rate is known.
+/// Fewest samples after which an error estimate may end the work on a texel: two doublings.
 constexpr std::uint32_t kFirstJudged = 32;
 /// Endless light: the warm-up ends where another bounce adds less than this share, or after so many.
 constexpr double kSettled = 1e-4;
@@ -54,6 +53,13 @@ GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKer
   reflectance_.resize(count);
   cache_.resize(count * stored());
   if (!scene_.levels.endless) levelSums_.resize(count * stored());
+  std::vector<std::uint32_t> lengths;
+  std::vector<std::uint32_t> pages;
+  for (const Wave& wave : waves_) {
+    lengths.push_back(wave.count);
+    pages.push_back(wave.page);
+  }
+  errors_.emplace(lengths, pages);
   std::size_t probes = 0;
   for (const PageTexels& page : texels) {
     firstProbe_.push_back(probes);
@@ -93,7 +99,9 @@ Expected<void> GatherIntegrator::run(Progress& progress) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   const auto elapsed = [start] { return std::chrono::duration<double>(Clock::now() - start).count(); };
-  const auto samples = static_cast<std::uint32_t>(options_.samples);
+  const auto least = static_cast<std::uint32_t>(options_.samples);
+  const std::uint32_t samples =
+      options_.targetError > 0.0f ? std::max(least, static_cast<std::uint32_t>(options_.maxSamples)) : least;
   progress.begin("bake", map_.size() * std::uint64_t{samples});
   if (scene_.levels.count > 0)
     if (auto warm = warmUp(progress); !warm) return warm;
@@ -107,7 +115,8 @@ Expected<void> GatherIntegrator::run(Progress& progress) {
     if (auto done = pass(first, end, progress); !done) return done;
     secondsPerSample = (elapsed() - began) / (end - first);
     first = end;
-    if (options_.targetError > 0.0f && end >= kFirstJudged && markDone() >= kTargetShare) break;
+    if (options_.targetError > 0.0f && end >= std::max(kFirstJudged, least) && markDone() >= kTargetShare) break;
+    if (scene_.levels.count > 0 && first < samples) renewCache();
   }
   progress.end();
   return {};
@@ -193,24 +202,27 @@ Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Pr
     GatheredWave done = texels.gather(first, end, cache_);
     for (std::size_t i = 0; i < wave.count; ++i)
       coverage_[map_.firstOfPage(wave.page) + wave.first + i] = texels.coverage(i);
-    store(wave, done);
+    store(w, done, first, end);
     std::fill_n(samplesOf_.begin() + map_.firstOfPage(wave.page) + wave.first, wave.count, end);
     progress.advance(std::uint64_t{wave.count} * (end - first));
     return done;
   });
   if (!traced) return traced;
-  estimateErrors(first, end);
-  if (scene_.levels.count > 0 && end < static_cast<std::uint32_t>(options_.samples)) renewCache();
+  estimateErrors();
   return {};
 }
 
-void GatherIntegrator::store(const Wave& wave, const GatheredWave& done) {
+void GatherIntegrator::store(std::size_t index, const GatheredWave& done, std::uint32_t first, std::uint32_t end) {
+  const Wave& wave = waves_[index];
+  std::array<float, kLanes> before{};
+  std::array<float, kLanes> now{};
   const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
   for (std::size_t i = 0; i < wave.count; ++i) {
     const GatheredTexel& texel = done.texels[i];
     Sums& sums = sums_[start + i];
-    sums.before = luminance(sums.flat);
+    before[i] = luminance(sums.flat) / static_cast<float>(std::max(1u, first));
     sums.flat += Vec3(texel.flat);
+    now[i] = luminance(sums.flat) / static_cast<float>(end);
     for (std::size_t k = 0; k < 3; ++k) sums.rnm[k] += Vec3(texel.rnm[k]);
     if (!scene_.levels.endless)
       for (std::size_t l = 0; l < stored(); ++l) levelSums_[(start + i) * stored() + l] += Vec3(texel.levels[l]);
@@ -219,6 +231,7 @@ void GatherIntegrator::store(const Wave& wave, const GatheredWave& done) {
       for (std::size_t k = 0; k < kProbeNormals; ++k)
         probes_[probeOf(wave.page, wave.first + i)][k] += Vec3(texel.probes[k]);
   }
+  errors_->add(index, before, now, first, end - first);
 }
 
 void GatherIntegrator::substituteInvalid(std::span<const std::uint32_t> rays) {
@@ -245,36 +258,10 @@ void GatherIntegrator::renewCache() {
       cache_[s.texel * stored() + l] = reflectance_[s.texel] * lightOf(s.source, l);
 }
 
-void GatherIntegrator::estimateErrors(std::uint32_t first, std::uint32_t end) {
-  if (first == 0) return;
-  const double n0 = first;
-  const double n1 = end - first;
-  parallelFor(waves_.size(), 256, [&](std::size_t firstWave, std::size_t lastWave) {
-    for (std::size_t w = firstWave; w < lastWave; ++w) {
-      Wave& wave = waves_[w];
-      if (wave.done) continue;
-      const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
-      double sum = 0.0;
-      for (std::size_t t = start; t < start + wave.count; ++t) {
-        const auto before = static_cast<double>(sums_[t].before);
-        const double difference = before / n0 - (static_cast<double>(luminance(sums_[t].flat)) - before) / n1;
-        sum += difference * difference;
-      }
-      wave.spreadBefore = wave.spread;
-      wave.spread = sum * n0 * n1 / ((n0 + n1) * (n0 + n1));
-    }
-  });
-  double before = 0.0;
-  double now = 0.0;
-  for (const Wave& wave : waves_)
-    if (!wave.done && wave.spreadBefore >= 0.0) {
-      before += wave.spreadBefore;
-      now += wave.spread;
-    }
-  if (end == 2 * first && before > 0.0 && now > 0.0) rate_ = std::clamp(std::log2(before / now), 1.0, 2.0);
-  const double correction = 1.0 / (std::exp2(rate_) - 1.0);
-  for (Wave& wave : waves_)
-    if (!wave.done) wave.standardError = static_cast<float>(std::sqrt(wave.spread / wave.count * correction));
+void GatherIntegrator::estimateErrors() {
+  std::vector<std::uint8_t> live(waves_.size());
+  for (std::size_t w = 0; w < waves_.size(); ++w) live[w] = waves_[w].done ? 0 : 1;
+  errors_->endPass(live);
 }
 
 double GatherIntegrator::markDone() {
@@ -282,16 +269,19 @@ double GatherIntegrator::markDone() {
   for (std::size_t t = 0; t < sums_.size(); ++t) total += static_cast<double>(luminance(sums_[t].flat)) / samplesOf_[t];
   const double floor = kDarkFloor * total / static_cast<double>(std::max<std::size_t>(1, sums_.size()));
   std::size_t met = 0;
-  for (Wave& wave : waves_) {
-    if (!wave.done) {
-      const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
-      double darkest = std::numeric_limits<double>::infinity();
-      for (std::size_t t = start; t < start + wave.count; ++t)
-        darkest = std::min(darkest, static_cast<double>(luminance(sums_[t].flat)) / samplesOf_[t]);
-      wave.done = static_cast<double>(wave.standardError) <=
-                  static_cast<double>(options_.targetError) * std::max(darkest, floor);
+  for (std::size_t w = 0; w < waves_.size(); ++w) {
+    Wave& wave = waves_[w];
+    const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
+    std::size_t metHere = 0;
+    for (std::size_t i = 0; i < wave.count; ++i) {
+      const std::size_t t = start + i;
+      const double light = static_cast<double>(luminance(sums_[t].flat)) / samplesOf_[t];
+      const bool inside = 2 * backFaces_[t] > samplesOf_[t];
+      metHere += inside || static_cast<double>(errors_->standardError(w, i)) <=
+                               static_cast<double>(options_.targetError) * std::max(light, floor);
     }
-    if (wave.done) met += wave.count;
+    wave.done = wave.done || metHere == wave.count;
+    met += metHere;
   }
   return sums_.empty() ? 1.0 : static_cast<double>(met) / static_cast<double>(sums_.size());
 }
@@ -304,7 +294,7 @@ BakedTexel GatherIntegrator::texel(std::uint32_t page, std::size_t index) const 
   for (std::size_t k = 0; k < 3; ++k) baked.value.rnm[k] = sums_[t].rnm[k] * scale;
   baked.coverage = coverage_[t];
   baked.validity = 1.0f - static_cast<float>(backFaces_[t]) * scale;
-  baked.standardError = waves_[firstWave_[page] + index / kLanes].standardError;
+  baked.standardError = errors_->standardError(firstWave_[page] + index / kLanes, index % kLanes);
   baked.samples = coverage_[t] > 0.0f ? samplesOf_[t] : 0;
   baked.probed = index % PathIntegrator::kProbeStride == 0;
   if (baked.probed)

@@ -4,9 +4,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "baker/doubling_error.h"
 #include "baker/gather_wave.h"
 #include "scene/expected.h"
 #include "scene/progress.h"
@@ -14,8 +16,9 @@
 namespace lumel {
 
 struct GatherOptions {
-  int samples = 1;   // per texel; with a target error or a time budget the most
-  int bounces = -1;  // indirect bounces; negative: all that matter
+  int samples = 1;     // per texel; with a time budget the most, with a target error the least
+  int maxSamples = 1;  // with a target error: the most
+  int bounces = -1;    // indirect bounces; negative: all that matter
   std::uint64_t seed = 1;
   float targetError = 0.0f;        // relative standard error at which a wave of texels is done; 0: none
   double timeBudgetSeconds = 0.0;  // no pass is begun that would probably end later; 0: none
@@ -51,10 +54,8 @@ struct BakedTexel {
 /// exactly N bounces. Of more than CacheLevels::kMost levels the highest are kept, and the lowest of these stays as the
 /// warm-up left it.
 ///
-/// Error: after a pass that doubled a texel's samples let d be half the difference between the means of the two halves.
-/// If the variance of n samples of the sequence falls as n^-rate, then E[d^2] = (2^rate - 1) V[mean] exactly: the two
-/// halves of an Owen-scrambled sequence are not independent, and this is what their dependence amounts to. The rate is
-/// measured, from the spreads of all texels at two successive doublings; d^2 is pooled over a wave of texels.
+/// Errors: DoublingError. With a target a wave of texels is done when each of its texels meets it; texels inside of
+/// something (validity under one half) are not judged.
 class GatherIntegrator {
  public:
   /// Keeps references to its arguments.
@@ -75,23 +76,19 @@ class GatherIntegrator {
     std::uint32_t page = 0;
     std::uint32_t first = 0;  // texel of the page
     std::uint32_t count = 0;
-    bool done = false;     // the target error is met
-    double spread = -1.0;  // sum over texels of d^2 after the last pass
-    double spreadBefore = -1.0;
-    float standardError = 0.0f;
+    bool done = false;  // the target error is met
   };
   /// Sums over all samples so far.
   struct Sums {
     Vec3 flat{0};
     std::array<Vec3, 3> rnm{Vec3(0), Vec3(0), Vec3(0)};
-    float before = 0.0f;  // luminance of `flat` before the last pass
   };
 
   Expected<void> warmUp(Progress& progress);
   void solveLinks(std::span<const CacheLink> links, std::span<const Vec3> direct, std::span<const Vec3> seen,
                   std::span<const Vec3> relit);
   Expected<void> pass(std::uint32_t first, std::uint32_t end, Progress& progress);
-  void store(const Wave& wave, const GatheredWave& done);
+  void store(std::size_t wave, const GatheredWave& done, std::uint32_t first, std::uint32_t end);
   void renewCache();
   /// `rays`: gather rays of each texel.
   void substituteInvalid(std::span<const std::uint32_t> rays);
@@ -100,8 +97,8 @@ class GatherIntegrator {
   std::size_t probeOf(std::uint32_t page, std::size_t index) const {
     return firstProbe_[page] + index / PathIntegrator::kProbeStride;
   }
-  void estimateErrors(std::uint32_t first, std::uint32_t end);
-  /// Marks waves that meet the target. Returns the share of texels in such waves.
+  void estimateErrors();
+  /// Marks waves that meet the target. Returns the share of texels that do.
   double markDone();
   template <class Body>
   Expected<void> forEachWave(Progress& progress, Body body);
@@ -121,7 +118,7 @@ class GatherIntegrator {
   std::vector<std::array<Vec3, kProbeNormals>> probes_;
   std::vector<std::size_t> firstProbe_;  // per page
   std::vector<std::uint32_t> samplesOf_;
-  double rate_ = 1.0;
+  std::optional<DoublingError> errors_;
   std::vector<TexelMap::Substitute> substitutes_;
   std::uint64_t rays_ = 0;
   std::uint64_t shadowRays_ = 0;
