@@ -86,8 +86,8 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
   options.number("time-budget", a.bake.timeBudgetSeconds, {0.0f},
                  "Begin no pass that would end later than so many seconds of gathering; 0: none. The result then "
                  "depends on the machine");
-  options.integer("bounces", a.bake.bounces, {0, 1024}, "Indirect bounces; 0: direct light only").defaultText =
-      "all that matter";
+  options.integerOrWord("bounces", a.bake.bounces, {0, 1024}, "all", kAllBounces,
+                        "Indirect bounces; 0: direct light only, all: as many as matter");
   options.color("sky-color", a.skyColor, {0.0f}, "Radiance of an even sky in nits, red green blue [none]");
   options.path("sky", a.sky, "Sky image: equirectangular .hdr or .exr [none]");
   options
@@ -210,7 +210,6 @@ bool denoises(const BakeArguments& a) {
 
 BakeRecord recordOf(const BakeArguments& a, int dilate, nlohmann::ordered_json settings) {
   settings["dilate"] = dilate;
-  if (a.bake.bounces == kAllBounces) settings["bounces"] = describeBounces(a.bake.bounces);
   // What cannot change the result is kept out of the settings, so that equal bakes have equal settings.
   for (const char* key : {"output", "threads"}) settings.erase(key);
   BakeRecord record;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include "baker/light_transport.h"
 #include "baker/sample_lanes.h"
@@ -22,7 +23,20 @@ struct Receiver {
 };
 
 /// The sample patterns that one receiver's decisions use, counted from a base.
-enum LightPattern : std::uint32_t { kPunctual, kEmitter, kEmitterPoint, kSky, kLightPatterns };
+enum LightPattern : std::uint32_t { kPunctual, kEmitter, kEmitterPoint, kSun, kSky, kLightPatterns };
+
+/// One way to take a light sample. All that a scene needs (lightStrategies) add up to its direct light.
+struct LightStrategy {
+  enum Kind { EveryPunctual, OnePunctual, Emissive, Sun, Sky };
+  Kind kind = EveryPunctual;
+  std::size_t light = 0;  // of OnePunctual
+};
+
+/// Scenes with no more punctual lights than this may sample each by itself.
+inline constexpr std::size_t kSeparateLights = 8;
+
+/// `separate`: a strategy for each punctual light, where there are few; else one that chooses among them.
+std::vector<LightStrategy> lightStrategies(const LightTransport& transport, bool separate);
 
 /// The lanes of a wave that want light: those that are `active`.
 struct LightLanes {
@@ -30,12 +44,17 @@ struct LightLanes {
   std::array<Receiver, kLanes> receivers;
 };
 
-/// Samples the lights for every active lane and calls add(lane, wi, radianceOverPdf) for each that is visible.
-/// `surfacePdf(cosTheta)` is the density with which the receiver gathers from a direction, for multiple importance
-/// sampling against hits. Returns the number of shadow rays.
-template <class SurfacePdf, class Add>
-std::uint64_t directLight(const LightTransport& transport, const LightLanes& lanes, const SampleLanes& samples,
-                          std::uint32_t patternBase, TraceMode mode, SurfacePdf surfacePdf, Add add) {
+struct IgnoreLight {
+  void operator()(int, const Vec3&, const Vec3&) const {}
+};
+
+/// Takes one light sample by `strategy` for every active lane and calls add(lane, wi, radianceOverPdf) for each that is
+/// visible, and tried(...) alike for all that were looked for. `surfacePdf(cosTheta)` is the density with which the
+/// receiver gathers from a direction, for multiple importance sampling against hits. Returns the number of shadow rays.
+template <class SurfacePdf, class Add, class Tried = IgnoreLight>
+std::uint64_t sampleLight(const LightTransport& transport, const LightStrategy& strategy, const LightLanes& lanes,
+                          const SampleLanes& samples, std::uint32_t patternBase, TraceMode mode, SurfacePdf surfacePdf,
+                          Add add, Tried tried = {}) {
   std::uint64_t shadowRays = 0;
   const auto estimate = [&](auto takeSample) {
     ShadowPacket shadows;
@@ -54,25 +73,56 @@ std::uint64_t directLight(const LightTransport& transport, const LightLanes& lan
         shadows.set(lane, receiver.rayStart, s.wi, std::numeric_limits<float>::infinity());
       else
         shadows.set(lane, receiver.rayStart, s.target - receiver.rayStart, 1.0f);
+      tried(lane, wi[l], light[l]);
       ++shadowRays;
     }
+    if (shadowRays == 0) return;
     transport.rays.occluded(shadows, mode);
     for (int lane = 0; lane < kLanes; ++lane)
       if (shadows.visible(lane)) add(lane, wi[static_cast<std::size_t>(lane)], light[static_cast<std::size_t>(lane)]);
   };
-  if (!transport.punctual.empty()) {
-    const UnitLanes choice = samples.draw1D(patternBase + kPunctual);
-    estimate([&](const Receiver& r, int lane) { return transport.punctual.sample(r.p, r.ns, choice.u[lane]); });
+  switch (strategy.kind) {
+    case LightStrategy::EveryPunctual: {
+      const UnitLanes choice = samples.draw1D(patternBase + kPunctual);
+      estimate([&](const Receiver& r, int lane) { return transport.punctual.sample(r.p, r.ns, choice.u[lane]); });
+      break;
+    }
+    case LightStrategy::OnePunctual:
+      estimate([&](const Receiver& r, int) { return transport.punctual.sampleOne(strategy.light, r.p); });
+      break;
+    case LightStrategy::Emissive: {
+      const UnitLanes choice = samples.draw1D(patternBase + kEmitter);
+      const UnitSquareLanes point = samples.draw2D(patternBase + kEmitterPoint);
+      estimate(
+          [&](const Receiver& r, int lane) { return transport.emissive.sample(r.p, choice.u[lane], point[lane]); });
+      break;
+    }
+    case LightStrategy::Sun: {
+      const UnitSquareLanes point = samples.draw2D(patternBase + kSun);
+      estimate([&](const Receiver&, int lane) { return transport.environment.sampleSun(point[lane]); });
+      break;
+    }
+    case LightStrategy::Sky: {
+      const UnitSquareLanes point = samples.draw2D(patternBase + kSky);
+      estimate([&](const Receiver&, int lane) { return transport.environment.sampleSky(point[lane]); });
+      break;
+    }
   }
-  if (!transport.emissive.empty()) {
-    const UnitLanes choice = samples.draw1D(patternBase + kEmitter);
-    const UnitSquareLanes point = samples.draw2D(patternBase + kEmitterPoint);
-    estimate([&](const Receiver& r, int lane) { return transport.emissive.sample(r.p, choice.u[lane], point[lane]); });
-  }
-  if (transport.environment.sampled()) {
-    const UnitSquareLanes point = samples.draw2D(patternBase + kSky);
-    estimate([&](const Receiver&, int lane) { return transport.environment.sample(point[lane]); });
-  }
+  return shadowRays;
+}
+
+/// One sample by each of the strategies that the scene needs.
+template <class SurfacePdf, class Add>
+std::uint64_t directLight(const LightTransport& transport, const LightLanes& lanes, const SampleLanes& samples,
+                          std::uint32_t patternBase, TraceMode mode, SurfacePdf surfacePdf, Add add) {
+  std::uint64_t shadowRays = 0;
+  const auto take = [&](bool needed, LightStrategy::Kind kind) {
+    if (needed) shadowRays += sampleLight(transport, {kind}, lanes, samples, patternBase, mode, surfacePdf, add);
+  };
+  take(!transport.punctual.empty(), LightStrategy::EveryPunctual);
+  take(!transport.emissive.empty(), LightStrategy::Emissive);
+  take(transport.environment.sunSampled(), LightStrategy::Sun);
+  take(transport.environment.skySampled(), LightStrategy::Sky);
   return shadowRays;
 }
 

@@ -45,6 +45,8 @@ GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKer
       waves_.push_back({p, static_cast<std::uint32_t>(first),
                         static_cast<std::uint32_t>(std::min<std::size_t>(kLanes, texels[p].size() - first))});
   }
+  scene_.strategies = lightStrategies(transport, true);
+  if (!scene_.strategies.empty()) spreads_.resize(waves_.size() * (scene_.strategies.size() + 1));
   const std::size_t count = map_.size();
   sums_.resize(count);
   coverage_.resize(count);
@@ -66,6 +68,12 @@ GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKer
     probes += (page.size() + PathIntegrator::kProbeStride - 1) / PathIntegrator::kProbeStride;
   }
   probes_.resize(probes);
+}
+
+std::span<LightSpread> GatherIntegrator::spreadsOf(std::size_t wave) {
+  if (spreads_.empty()) return {};
+  const std::size_t sources = scene_.strategies.size() + 1;
+  return std::span(spreads_).subspan(wave * sources, sources);
 }
 
 /// Calls body(wave index, GatheredWave&) for all waves; what they count is added up in their order.
@@ -199,7 +207,7 @@ Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Pr
     const Wave& wave = waves_[w];
     if (wave.done) return GatheredWave{};
     GatherWave texels(scene_, wave.page, wave.first, wave.count);
-    GatheredWave done = texels.gather(first, end, cache_);
+    GatheredWave done = texels.gather(first, end, cache_, spreadsOf(w));
     for (std::size_t i = 0; i < wave.count; ++i)
       coverage_[map_.firstOfPage(wave.page) + wave.first + i] = texels.coverage(i);
     store(w, done, first, end);

@@ -102,12 +102,14 @@ class GatherIntegrator {
   double markDone();
   template <class Body>
   Expected<void> forEachWave(Progress& progress, Body body);
+  std::span<LightSpread> spreadsOf(std::size_t wave);
   std::size_t stored() const { return static_cast<std::size_t>(scene_.levels.count); }
 
   const GatherOptions options_;
   TexelMap map_;
   GatherScene scene_;
   std::vector<Wave> waves_;
+  std::vector<LightSpread> spreads_;    // strategies and gather rays of every wave
   std::vector<std::size_t> firstWave_;  // per page
   std::vector<Sums> sums_;
   std::vector<Vec3> levelSums_;  // levels.count per texel, unless endless

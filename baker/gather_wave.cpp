@@ -12,6 +12,7 @@ constexpr std::uint32_t kDirection = kLightPatterns + 1;
 constexpr std::uint32_t kWarmDirection = kLightPatterns + 2;
 constexpr std::uint32_t kHits = kLightPatterns + 3;
 constexpr std::uint32_t kWarmHits = kLightPatterns + 4;
+constexpr std::uint32_t kLightStretch = kLightPatterns + 5;
 
 /// Collects the start of the cache.
 struct WarmSink {
@@ -42,6 +43,8 @@ struct GatherSink {
   std::size_t probedLane = kLanes;  // at most one texel of a wave is probed
   MapSums sums{};
   MapTotals totals{};
+  bool tallied = false;  // whether the gather rays are
+  LightTally rays{};
 
   /// Radiance that a texel reflects, by level.
   const Vec3* reflectedBy(std::uint32_t texel) const {
@@ -52,6 +55,9 @@ struct GatherSink {
   }
   void report(std::size_t lane, std::uint32_t sample) { result.nonFinite.push_back({page, coords[lane], sample}); }
 
+  void tally(std::size_t lane, const Vec3& dirTangent, const Vec3& light) {
+    if (tallied) rays.add(lane, luminance(light) * std::max(0.0f, dirTangent.z));
+  }
   void addProbes(std::size_t lane, const Vec3& dirTangent, const Vec3& light) {
     for (std::size_t i = 0; i < kProbeNormals; ++i)
       result.texels[lane].probes[i] += Vec3d(light * std::max(0.0f, glm::dot(dirTangent, probeNormals()[i])));
@@ -75,7 +81,8 @@ struct GatherSink {
     if (addLight(dirTangent, kernels, light, sums))
       for (std::size_t lane = 0; lane < kLanes; ++lane)
         if (!isFinite(light[lane])) report(lane, sampleOf(lane));
-    if (probedLane < kLanes && isFinite(light[probedLane])) addProbes(probedLane, dirTangent[probedLane], light[probedLane]);
+    if (probedLane < kLanes && isFinite(light[probedLane]))
+      addProbes(probedLane, dirTangent[probedLane], light[probedLane]);
   }
   /// Light of `depth` bounces, for every level that holds so many.
   void addToLevels(std::size_t lane, const Vec3& dirTangent, const Vec3& light, int depth) {
@@ -98,6 +105,7 @@ struct GatherSink {
   void light(const Flight& flight, const Vec3& radiance, int depth) {
     const Vec3 light = flight.beta * radiance;
     if (!isFinite(light)) return report(flight.lane, flight.sample);
+    tally(flight.lane, flight.dirTangent, light);
     addToMaps(flight.lane, flight.dirTangent, light);
     addToLevels(flight.lane, flight.dirTangent, light, depth);
   }
@@ -105,6 +113,7 @@ struct GatherSink {
     if (const int level = scene.levels.read(scene.bounces, flight.depth); level >= 0) {
       const Vec3 light = flight.beta * reflectedBy(texel)[level];
       if (!isFinite(light)) return report(flight.lane, flight.sample);
+      tally(flight.lane, flight.dirTangent, light);
       addToMaps(flight.lane, flight.dirTangent, light);
     }
     passOnLevels(flight.lane, flight.dirTangent, flight.beta, texel, flight.depth);
@@ -178,6 +187,7 @@ GatherWave::GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t
     const TexelCoord at = scene.texels[page].coords[first + lane];
     samplers_[lane] = TexelSampler(scene.seed, page, at.x, at.y);
     covered_[lane] = points_.covered(lane);
+    coveredCount_ += covered_[lane];
     lightSamples_.setTexel(static_cast<int>(lane), samplers_[lane]);
   }
 }
@@ -275,37 +285,72 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   return texels;
 }
 
-GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const Vec3> cache) {
+GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const Vec3> cache,
+                                std::span<LightSpread> spreads) {
   GatheredWave result;
   GatherSink sink{scene_, cache, result, page_, std::span(scene_.texels[page_].coords).subspan(first_, count_)};
   for (std::size_t lane = 0; lane < count_; ++lane)
     if ((first_ + lane) % PathIntegrator::kProbeStride == 0) sink.probedLane = lane;
   for (std::uint32_t sample = first; sample < end;) {
     const NetRange net = netAt(sample, end);
+    if (!spreads.empty()) gatherLight(net, spreads, sink);
     points_.draw(samplers_, kFootprint, net.first, std::min(WavePoints::kMost, net.count()));
-    gatherLight(net, sink);
+    sink.tallied = !spreads.empty() && isPilot(net.first);
     gatherRays(net, sink);
+    if (sink.tallied) sink.rays.enter(spreads.back(), net.count(), coveredCount_);
+    sink.rays = {};
     sample += net.count();
   }
   sink.finish();
   return result;
 }
 
-/// One light sample per sample and kind of light.
-void GatherWave::gatherLight(const NetRange& net, GatherSink& sink) {
-  for (std::uint32_t s = net.first; s < net.first + net.count(); ++s) {
+/// Light samples of each strategy, weighed so that they add up to as many as gather rays.
+void GatherWave::gatherLight(const NetRange& net, std::span<LightSpread> spreads, GatherSink& sink) {
+  const std::size_t strategies = scene_.strategies.size();
+  if (startsLightStretch(net.first))
+    for (std::size_t k = 0; k < strategies; ++k) spreads[k].power = lightPower(spreads, k);
+  std::array<TexelSampler, kLanes> samplers;
+  for (std::size_t lane = 0; lane < count_; ++lane) {
+    samplers[lane] = TexelSampler(samplers_[lane].seedOf(kLightStretch), lightStretch(net.first), 0, 0);
+    lightSamples_.setTexel(static_cast<int>(lane), samplers[lane]);
+  }
+  for (std::size_t k = 0; k < strategies; ++k) sampleStrategy(k, net, samplers, spreads[k], sink);
+}
+
+void GatherWave::sampleStrategy(std::size_t strategy, const NetRange& net,
+                                const std::array<TexelSampler, kLanes>& samplers, LightSpread& spread,
+                                GatherSink& sink) {
+  const std::uint32_t first = scaledBy(spread.power, net.first);
+  const std::uint32_t count = std::max(1u, scaledBy(spread.power, net.count()));
+  const float weight = kInvPi * static_cast<float>(net.count()) / static_cast<float>(count);
+  const bool pilot = isPilot(net.first);
+  LightTally tally;
+  for (std::uint32_t s = first; s < first + count; ++s) {
+    if ((s - first) % WavePoints::kMost == 0) {
+      points_.draw(samplers, kFootprint, s, std::min(WavePoints::kMost, count));
+      settle(sink.sums, sink.totals);
+    }
     const PointLanes& points = points_[s];
     LitLanes lit{points, s, sink};
     lightSamples_.setSampleOfAll(s);
-    sink.result.shadowRays += directLight(
-        scene_.transport, points.light, lightSamples_, 0, TraceMode::Packet,
+    const auto flat = [&](int lane, const Vec3& wi, const Vec3& light) {
+      return luminance(light) * kInvPi * glm::dot(wi, points.light.receivers[static_cast<std::size_t>(lane)].ns);
+    };
+    sink.result.shadowRays += sampleLight(
+        scene_.transport, scene_.strategies[strategy], points.light, lightSamples_, 0, TraceMode::Packet,
         [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
-        [&](int lane, const Vec3& wi, const Vec3& light) {
-          lit.add(static_cast<std::size_t>(lane), wi, light * kInvPi);
+        [&](int lane, const Vec3& wi, const Vec3& found) {
+          if (pilot) tally.add(static_cast<std::size_t>(lane), flat(lane, wi, found));
+          lit.add(static_cast<std::size_t>(lane), wi, found * weight);
+        },
+        [&](int lane, const Vec3& wi, const Vec3& tried) {
+          if (pilot) tally.unshadowed += flat(lane, wi, tried) * flat(lane, wi, tried);
         });
     lit.flush();
-    if ((s & 15u) == 15u) settle(sink.sums, sink.totals);
   }
+  if (pilot) tally.enter(spread, count, coveredCount_);
+  settle(sink.sums, sink.totals);
 }
 
 void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
@@ -366,6 +411,9 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
       if (isFinite(light[lane])) sink.addToLevels(lane, rays.dirTangent[lane], light[lane], 0);
     }
   }
+  if (sink.tallied)
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if (isFinite(light[lane])) sink.tally(lane, rays.dirTangent[lane], light[lane]);
   sink.addToMaps(rays.dirTangent, light, [&](std::size_t lane) { return net_.sample(packet.cell, lane); });
 }
 

@@ -9,6 +9,7 @@
 
 #include "baker/gather_kernels.h"
 #include "baker/gather_tracer.h"
+#include "baker/light_effort.h"
 #include "baker/path_integrator.h"
 #include "baker/stratified_net.h"
 #include "baker/wave_points.h"
@@ -45,6 +46,7 @@ struct GatherScene {
   int lastDepth = 0;  // GatherTracer
   CacheLevels levels{};
   TraceMode gatherMode = TraceMode::Packet;
+  std::vector<LightStrategy> strategies{};  // of the texels' own light
 };
 
 /// What the texels of a wave gathered in one pass: sums over its samples.
@@ -97,15 +99,19 @@ class GatherWave {
   std::array<WarmTexel, kLanes> warmUp(std::span<CacheLink> links, GatheredWave& counts);
 
   /// Samples [first, end) of every covered texel. `cache`: levels.count values per texel of the map: the radiance
-  /// that the texel reflects.
-  GatheredWave gather(std::uint32_t first, std::uint32_t end, std::span<const Vec3> cache);
+  /// that the texel reflects. `spreads`: what the wave remembers of its light from pass to pass: of each of
+  /// GatherScene::strategies, and last of the gather rays; empty without strategies.
+  GatheredWave gather(std::uint32_t first, std::uint32_t end, std::span<const Vec3> cache,
+                      std::span<LightSpread> spreads);
 
  private:
   Vec3 meanReflectance(std::size_t lane) const;
   Vec3 reflectanceOf(const PlaceOnTriangle& place, float& opacity) const;
   void warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts);
   Flight flightOf(std::size_t lane, std::uint32_t sample, const PointLanes& from, const AimedRays& rays) const;
-  void gatherLight(const NetRange& net, GatherSink& sink);
+  void gatherLight(const NetRange& net, std::span<LightSpread> spreads, GatherSink& sink);
+  void sampleStrategy(std::size_t strategy, const NetRange& net, const std::array<TexelSampler, kLanes>& samplers,
+                      LightSpread& spread, GatherSink& sink);
   void gatherRays(const NetRange& net, GatherSink& sink);
   /// A packet of gather rays, from its start to where the light of its texels is known.
   struct Packet {
@@ -123,6 +129,7 @@ class GatherWave {
   WavePoints points_;
   std::array<TexelSampler, kLanes> samplers_;
   std::array<bool, kLanes> covered_{};
+  std::size_t coveredCount_ = 0;
   SampleLanes lightSamples_;
   NetLanes net_;
   static constexpr std::uint32_t kInFlight = 4;

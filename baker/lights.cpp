@@ -80,6 +80,14 @@ PunctualLights::PunctualLights(const std::vector<Light>& lights, float extent) {
   byPower_ = Distribution(powers);
 }
 
+LightSample PunctualLights::sampleOne(std::size_t index, const Vec3& p) const {
+  LightSample sample;
+  sample.weight = facingIrradiance(lights_[index], p, sample.wi);
+  sample.distant = lights_[index].type == LightType::Directional;
+  sample.target = lights_[index].position;
+  return sample;
+}
+
 LightSample PunctualLights::sample(const Vec3& p, const Vec3& n, float u) const {
   LightSample sample;
   std::size_t chosen = 0;

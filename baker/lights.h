@@ -36,6 +36,9 @@ class PunctualLights {
   /// kLocalLights, in proportion to power.
   LightSample sample(const Vec3& p, const Vec3& n, float u) const;
 
+  /// What light `index` brings, without a choice.
+  LightSample sampleOne(std::size_t index, const Vec3& p) const;
+
   static constexpr std::size_t kLocalLights = 32;
 
  private:

@@ -121,6 +121,25 @@ Option& OptionTable::integer(const std::string& name, std::uint64_t& target, con
   return add(std::move(o));
 }
 
+Option& OptionTable::integerOrWord(const std::string& name, int& target, Range<int> range, const std::string& word,
+                                   int wordValue, const std::string& help) {
+  Option o{.name = name, .placeholder = "N|" + word, .help = help};
+  o.set = [&target, range, word, wordValue](Texts texts) -> Problem {
+    if (texts[0] == word) {
+      target = wordValue;
+      return {};
+    }
+    auto problem = parseIn(texts[0], range, target);
+    if (problem) *problem += ", or '" + word + "'";
+    return problem;
+  };
+  o.value = [&target, word, wordValue] {
+    return target == wordValue ? nlohmann::ordered_json(word) : nlohmann::ordered_json(target);
+  };
+  o.defaultText = target == wordValue ? word : std::to_string(target);
+  return add(std::move(o));
+}
+
 Option& OptionTable::number(const std::string& name, float& target, Range<float> range, const std::string& help) {
   Option o{.name = name, .placeholder = "X", .help = help, .defaultText = shortText(target)};
   o.set = [&target, range](Texts texts) { return parseIn(texts[0], range, target); };

@@ -52,6 +52,9 @@ class OptionTable {
   Option& flag(const std::string& name, bool& target, const std::string& help);
   Option& integer(const std::string& name, int& target, Range<int> range, const std::string& help);
   Option& integer(const std::string& name, std::uint64_t& target, const std::string& help);
+  /// A number in the range, or a word that stands for `wordValue`, which lies outside of it.
+  Option& integerOrWord(const std::string& name, int& target, Range<int> range, const std::string& word, int wordValue,
+                        const std::string& help);
   Option& number(const std::string& name, float& target, Range<float> range, const std::string& help);
   /// Empty unless given.
   Option& optionalNumber(const std::string& name, std::optional<float>& target, Range<float> range,

@@ -331,7 +331,7 @@ TEST(Gather, SamplesUntilTheTargetErrorIsMet) {
   TestScene test = busyRoom();
   test.integrator = Integrator::Gather;
   std::uint64_t raysBefore = 0;
-  for (const float target : {0.2f, 0.05f, 0.02f}) {
+  for (const float target : {0.2f, 0.02f, 0.01f}) {
     const BakeResult result = test.bake({.samples = 32, .targetError = target});
     std::size_t met = 0, texels = 0;
     for (const BakedPage& page : result.pages)

@@ -81,23 +81,13 @@ Environment patchySky() {
   return sky;
 }
 
-TEST(EnvironmentLight, DensityRoundTripsAndIntegratesToOne) {
-  const Environment sky = patchySky();
-  const EnvironmentLight light(sky);
-  ASSERT_TRUE(light.sampled());
-  int same = 0;
-  constexpr std::uint32_t kSamples = 8192;
-  double mean = 0;
-  for (std::uint32_t i = 0; i < kSamples; ++i) {
-    const LightSample s = light.sample(sobol2D(i, 1));
-    EXPECT_NEAR(glm::length(s.wi), 1.0f, 1e-5f);
-    // A direction within rounding of a cell's border may fall into the next one.
-    same += std::abs(light.pdf(s.wi) / s.pdf - 1.0f) < 1e-4f;
-    mean += static_cast<double>(luminance(s.weight)) / kSamples;
-  }
-  EXPECT_GE(same, static_cast<int>(0.998 * kSamples));
-
-  double integral = 0, radiance = 0;
+/// Integrals over the sphere of a part's density and of its light, by midpoints.
+struct SkyIntegral {
+  double density = 0;
+  double light = 0;
+};
+SkyIntegral integrate(const Environment& sky, const EnvironmentLight& light) {
+  SkyIntegral sum;
   constexpr int kRows = 1024, kColumns = 2048;
   const double cell = std::numbers::pi / kRows * 2 * std::numbers::pi / kColumns;
   for (int row = 0; row < kRows; ++row)
@@ -106,12 +96,66 @@ TEST(EnvironmentLight, DensityRoundTripsAndIntegratesToOne) {
                    azimuth = 2 * std::numbers::pi * (column + 0.5) / kColumns;
       const Vec3 w(static_cast<float>(std::sin(polar) * std::cos(azimuth)), static_cast<float>(std::cos(polar)),
                    static_cast<float>(std::sin(polar) * std::sin(azimuth)));
-      integral += static_cast<double>(light.pdf(w)) * std::sin(polar) * cell;
-      radiance += static_cast<double>(luminance(environmentRadiance(sky, w))) * std::sin(polar) * cell;
+      sum.density += static_cast<double>(light.pdf(w)) * std::sin(polar) * cell;
+      sum.light += static_cast<double>(luminance(environmentRadiance(sky, w))) * std::sin(polar) * cell;
     }
-  // Midpoints against borders of cells turned by 77 degrees: 1e-3.
-  EXPECT_NEAR(integral, 1.0, 2e-3);
-  EXPECT_NEAR(mean / radiance, 1.0, 3e-3);  // 8192 stratified samples of a weight that varies within cells
+  return sum;
+}
+
+/// Light that kSamples samples find; their densities are those that pdf() answers.
+double sampled(const EnvironmentLight& light, bool sun) {
+  int same = 0;
+  constexpr std::uint32_t kSamples = 8192;
+  double mean = 0;
+  for (std::uint32_t i = 0; i < kSamples; ++i) {
+    const LightSample s = sun ? light.sampleSun(sobol2D(i, 1)) : light.sampleSky(sobol2D(i, 1));
+    EXPECT_NEAR(glm::length(s.wi), 1.0f, 1e-5f);
+    // A direction within rounding of a cell's border may fall into the next one.
+    same += std::abs(light.pdf(s.wi) / s.pdf - 1.0f) < 1e-4f;
+    mean += static_cast<double>(luminance(s.weight)) / kSamples;
+  }
+  EXPECT_GE(same, static_cast<int>(0.998 * kSamples));
+  return mean;
+}
+
+TEST(EnvironmentLight, DensitiesRoundTripAndIntegrateToOne) {
+  const Environment sky = patchySky();
+  const EnvironmentLight light(sky);
+  ASSERT_TRUE(light.skySampled() && light.sunSampled());
+  const SkyIntegral whole = integrate(sky, light);
+  // Midpoints against borders of cells turned by 77 degrees: 1e-3 each.
+  EXPECT_NEAR(whole.density, 2.0, 4e-3);
+  // 8192 stratified samples of a weight that varies within cells.
+  EXPECT_NEAR((sampled(light, false) + sampled(light, true)) / whole.light, 1.0, 3e-3);
+}
+
+TEST(EnvironmentLight, EvenSkiesHaveNoSun) {
+  Environment sky = patchySky();
+  sky.image.setRgb(5, 0, Vec3(0.1f));
+  sky.image.setRgb(31, 7, Vec3(0.1f));
+  sky.image.setRgb(12, 15, Vec3(0.1f));
+  const EnvironmentLight even(sky);
+  EXPECT_FALSE(even.sunSampled());
+  const SkyIntegral whole = integrate(sky, even);
+  EXPECT_NEAR(whole.density, 1.0, 2e-3);
+  EXPECT_NEAR(sampled(even, false) / whole.light, 1.0, 3e-3);
+}
+
+// One texel of a sky of 4096 x 2048, a tenth of a degree wide, shines like the sun and nothing else does: all samples
+// find it, and rays that hit it by chance count next to nothing. Bilinear lookup makes it three texels wide.
+TEST(EnvironmentLight, OneBrightTexelOfALargeBlackSky) {
+  Environment sky;
+  sky.image = Image(4096, 2048, 3, 0.0f);
+  sky.image.setRgb(1000, 700, Vec3(1e6f));
+  const EnvironmentLight light(sky);
+  ASSERT_TRUE(light.sunSampled());
+  const double step = std::numbers::pi / 2048;
+  // The texel's light is its luminance times its solid angle: the interpolant's weights sum to one, but for the sine's
+  // curvature.
+  const double flux = 1e6 * step * step * std::sin(step * 700.5);
+  EXPECT_NEAR(sampled(light, true) / flux, 1.0, 3e-3);
+  EXPECT_FALSE(light.skySampled());
+  EXPECT_EQ(light.pdf({0, 1, 0}), 0.0f);
 }
 
 TEST(EnvironmentLight, NothingIsBuiltWithoutAnImage) {
@@ -122,6 +166,7 @@ TEST(EnvironmentLight, NothingIsBuiltWithoutAnImage) {
   const EnvironmentLight sky(constant);
   EXPECT_TRUE(sky.shines());
   EXPECT_FALSE(sky.sampled());
+  EXPECT_FALSE(black.sampled());
   EXPECT_EQ(sky.pdf({0, 1, 0}), 0.0f);
   constant.strength = 0.0f;
   EXPECT_FALSE(EnvironmentLight(constant).shines());

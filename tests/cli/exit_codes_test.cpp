@@ -43,7 +43,7 @@ TEST(ExitCodes, HelpAndVersionSucceedOnStandardOutput) {
   }
   // Defaults are shown.
   const std::string help = run({"bake", "--help"}).out;
-  EXPECT_NE(help.find("Indirect bounces; 0: direct light only [all that matter]"), std::string::npos);
+  EXPECT_NE(help.find("0: direct light only, all: as many as matter [all]"), std::string::npos);
   EXPECT_NE(help.find("a multiple of 4 [1024]"), std::string::npos);
 }
 
@@ -118,6 +118,27 @@ TEST(Config, CommandLineWinsOverConfigOverDefaults) {
   EXPECT_EQ(settings["sky-color"], nlohmann::json({1.0, 0.5, 0.0}));
   EXPECT_EQ(settings["bounces"], "all");
   EXPECT_EQ(settings["projection"], "flat");
+}
+
+// A command line can take back the limit that a config file sets, and the other way round.
+TEST(Config, BouncesGoBackToAll) {
+  const auto dir = scratch();
+  const std::string scene = floorScene(dir);
+  const auto bouncesOf = [&](const std::string& toml, const std::vector<std::string>& more) {
+    writeFile(dir / "bake.toml", toml);
+    std::vector<std::string> arguments = {"bake", scene,         "-o", dir / "out", "--samples",
+                                          "1",    "--page-size", "64", "--config",  dir / "bake.toml"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exitCode, 0) << outcome.err;
+    return readJson(dir / "out" / "bake.json")["settings"]["bounces"];
+  };
+  EXPECT_EQ(bouncesOf("bounces = 2\n", {}), 2);
+  EXPECT_EQ(bouncesOf("bounces = 2\n", {"--bounces", "all"}), "all");
+  EXPECT_EQ(bouncesOf("bounces = \"all\"\n", {}), "all");
+  EXPECT_EQ(bouncesOf("bounces = \"all\"\n", {"--bounces", "0"}), 0);
+  EXPECT_TRUE(fails(run({"bake", scene, "-o", dir / "out", "--bounces=-1"}), 2, {"--bounces", "-1", "'all'"}));
+  EXPECT_TRUE(fails(run({"bake", scene, "-o", dir / "out", "--bounces", "some"}), 2, {"--bounces", "'all'"}));
 }
 
 TEST(Config, MistakesAre2WithFileAndLine) {
