@@ -211,7 +211,7 @@ void compare(benchmark::State& state, int place, std::uint32_t samples, TraceMod
         naive += cpuSeconds() - start;
         start = cpuSeconds();
         GatherWave wave(scene, 0, first, kLanes);
-        const GatheredWave done = wave.gather(0, samples, f.cache, {});
+        const GatheredWave done = wave.gather(0, samples, f.cache);
         gather += cpuSeconds() - start;
         for (const GatheredTexel& texel : done.texels) gatherSum += texel.flat.x;
         rays += static_cast<double>(done.rays);
@@ -251,14 +251,14 @@ void gather(benchmark::State& state) {
   for (auto _ : state)
     for (const std::size_t first : firsts) {
       GatherWave wave(f.scene, 0, first, kLanes);
-      rays += static_cast<std::int64_t>(wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache, {}).rays);
+      rays += static_cast<std::int64_t>(wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache).rays);
     }
   state.SetItemsProcessed(rays);
 }
 BENCHMARK(gather)->ArgNames({"foliage", "rays"})->ArgsProduct({{Rooms, Foliage}, {16, 64, 256}})->Unit(benchmark::kMillisecond);
 
 void smoke(benchmark::State& state) {
-  compare(state, Rooms, 16, state.range(0) ? TraceMode::Coherent : TraceMode::Packet, 2, 1);
+  compare(state, Rooms, 16, state.range(0) != 0 ? TraceMode::Coherent : TraceMode::Packet, 2, 1);
 }
 BENCHMARK(smoke)->ArgName("coherent")->Arg(0)->Arg(1)->Iterations(1)->Unit(benchmark::kMillisecond);
 
