@@ -51,6 +51,7 @@ GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKer
   sums_.resize(count);
   coverage_.resize(count);
   backFaces_.resize(count);
+  place_.resize(count, TexelPlace::Open);
   samplesOf_.resize(count);
   reflectance_.resize(count);
   cache_.resize(count * stored());
@@ -154,6 +155,7 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
     return counts;
   });
   if (!traced) return traced;
+  findBuried();
   substituteInvalid(std::vector<std::uint32_t>(count, GatherWave::kWarmRays));
   solveLinks(links, direct, seen, relit);
   std::fill(backFaces_.begin(), backFaces_.end(), 0u);
@@ -206,10 +208,10 @@ Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Pr
   auto traced = forEachWave(progress, [&](std::size_t w) {
     const Wave& wave = waves_[w];
     if (wave.done) return GatheredWave{};
+    const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
     GatherWave texels(scene_, wave.page, wave.first, wave.count);
-    GatheredWave done = texels.gather(first, end, cache_, spreadsOf(w));
-    for (std::size_t i = 0; i < wave.count; ++i)
-      coverage_[map_.firstOfPage(wave.page) + wave.first + i] = texels.coverage(i);
+    GatheredWave done = texels.gather(first, end, cache_, std::span(place_).subspan(start, wave.count), spreadsOf(w));
+    for (std::size_t i = 0; i < wave.count; ++i) coverage_[start + i] = texels.coverage(i);
     store(w, done, first, end);
     std::fill_n(samplesOf_.begin() + map_.firstOfPage(wave.page) + wave.first, wave.count, end);
     progress.advance(std::uint64_t{wave.count} * (end - first));
@@ -234,7 +236,7 @@ void GatherIntegrator::store(std::size_t index, const GatheredWave& done, std::u
     for (std::size_t k = 0; k < 3; ++k) sums.rnm[k] += Vec3(texel.rnm[k]);
     if (!scene_.levels.endless)
       for (std::size_t l = 0; l < stored(); ++l) levelSums_[(start + i) * stored() + l] += Vec3(texel.levels[l]);
-    backFaces_[start + i] += texel.backFaces;
+    backFaces_[start + i] += place_[start + i] == TexelPlace::Buried ? end - first : texel.backFaces;
     if ((wave.first + i) % PathIntegrator::kProbeStride == 0)
       for (std::size_t k = 0; k < kProbeNormals; ++k)
         probes_[probeOf(wave.page, wave.first + i)][k] += Vec3(texel.probes[k]);
@@ -248,9 +250,22 @@ void GatherIntegrator::substituteInvalid(std::span<const std::uint32_t> rays) {
   substitutes_ = map_.substitutes(valid);
 }
 
+void GatherIntegrator::findBuried() {
+  std::vector<std::uint8_t> hidden(map_.size());
+  std::vector<std::uint8_t> valid(map_.size());
+  for (std::size_t t = 0; t < valid.size(); ++t) {
+    hidden[t] = backFaces_[t] >= GatherWave::kWarmRays ? 1 : 0;
+    valid[t] = 2 * backFaces_[t] <= GatherWave::kWarmRays ? 1 : 0;
+  }
+  const std::vector<std::uint8_t> buried = map_.buried(hidden, valid);
+  const std::vector<std::uint8_t> edge = map_.besideBuried(buried);
+  for (std::size_t t = 0; t < place_.size(); ++t)
+    place_[t] = buried[t] ? TexelPlace::Buried : edge[t] ? TexelPlace::Edge : TexelPlace::Open;
+}
+
 Vec3 GatherIntegrator::lightOf(std::size_t texel, std::size_t level) const {
   const Vec3& sum = scene_.levels.endless ? sums_[texel].flat : levelSums_[texel * stored() + level];
-  return sum / static_cast<float>(samplesOf_[texel]);
+  return sum / static_cast<float>(std::max(1u, weightOf(texel)));
 }
 
 void GatherIntegrator::renewCache() {
@@ -296,14 +311,15 @@ double GatherIntegrator::markDone() {
 
 BakedTexel GatherIntegrator::texel(std::uint32_t page, std::size_t index) const {
   const std::size_t t = map_.firstOfPage(page) + index;
-  const float scale = 1.0f / static_cast<float>(std::max(1u, samplesOf_[t]));
+  const float scale = 1.0f / static_cast<float>(std::max(1u, weightOf(t)));
   BakedTexel baked;
   baked.value.flat = sums_[t].flat * scale;
   for (std::size_t k = 0; k < 3; ++k) baked.value.rnm[k] = sums_[t].rnm[k] * scale;
   baked.coverage = coverage_[t];
-  baked.validity = 1.0f - static_cast<float>(backFaces_[t]) * scale;
-  baked.standardError = errors_->standardError(firstWave_[page] + index / kLanes, index % kLanes);
-  baked.samples = coverage_[t] > 0.0f ? samplesOf_[t] : 0;
+  const auto taken = static_cast<float>(std::max(1u, samplesOf_[t]));
+  baked.validity = 1.0f - static_cast<float>(backFaces_[t]) / taken;
+  baked.standardError = errors_->standardError(firstWave_[page] + index / kLanes, index % kLanes) * taken * scale;
+  if (coverage_[t] > 0.0f) baked.samples = place_[t] == TexelPlace::Buried ? GatherWave::kWarmRays : samplesOf_[t];
   baked.probed = index % PathIntegrator::kProbeStride == 0;
   if (baked.probed)
     for (std::size_t k = 0; k < kProbeNormals; ++k) baked.probes[k] = probes_[probeOf(page, index)][k] * scale;

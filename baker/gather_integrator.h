@@ -3,6 +3,7 @@
 // on the way; here the lightmap's texels are the points). Method, bias and figures: baker/README.md.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -54,6 +55,10 @@ struct BakedTexel {
 /// exactly N bounces. Of more than CacheLevels::kMost levels the highest are kept, and the lowest of these stays as the
 /// warm-up left it.
 ///
+/// Texels inside of something (all rays of the warm-up meet backs of single-sided surfaces) are not gathered for where
+/// their chart has others: what becomes of them is the finishing's business. Of texels beside them the parts that are
+/// inside do not count: samples whose ray meets a back are left out of the mean.
+///
 /// Errors: DoublingError. With a target a wave of texels is done when each of its texels meets it; texels inside of
 /// something (validity under one half) are not judged.
 class GatherIntegrator {
@@ -92,6 +97,12 @@ class GatherIntegrator {
   void renewCache();
   /// `rays`: gather rays of each texel.
   void substituteInvalid(std::span<const std::uint32_t> rays);
+  /// Tells by the warm-up's rays which texels lie inside of something.
+  void findBuried();
+  /// Samples of a texel that count.
+  std::uint32_t weightOf(std::size_t texel) const {
+    return samplesOf_[texel] - (place_[texel] == TexelPlace::Edge ? std::min(samplesOf_[texel], backFaces_[texel]) : 0);
+  }
   /// Irradiance / pi as of level `level`, from all samples so far.
   Vec3 lightOf(std::size_t texel, std::size_t level) const;
   std::size_t probeOf(std::uint32_t page, std::size_t index) const {
@@ -117,6 +128,7 @@ class GatherIntegrator {
   std::vector<Vec3> cache_;  // levels.count per texel
   std::vector<float> coverage_;
   std::vector<std::uint32_t> backFaces_;
+  std::vector<TexelPlace> place_;
   std::vector<std::array<Vec3, kProbeNormals>> probes_;
   std::vector<std::size_t> firstProbe_;  // per page
   std::vector<std::uint32_t> samplesOf_;

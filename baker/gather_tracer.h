@@ -30,7 +30,7 @@ struct Flight {
 /// Sink receives what rays find, in an order that depends on the rays alone:
 ///   light(flight, radiance, depth)   radiance that exists for bakes of `depth` indirect bounces and more
 ///   texel(flight, texel)             the flight ended on this texel
-///   backFace(flight)                 a gather ray met the back of a single-sided surface
+///   backFace(flight) -> bool         a gather ray met the back of a single-sided surface; whether to go on from there
 template <class Sink>
 class GatherTracer {
  public:
@@ -53,8 +53,9 @@ class GatherTracer {
       return;
     }
     const HitSurface hit = transport_.rays.surfaceAt(packet, lane);
-    if (flight.depth == 0 && hit.backFace && !transport_.materials.material(hit.material).doubleSided)
-      sink_.backFace(flight);
+    if (flight.depth == 0 && hit.backFace && !transport_.materials.material(hit.material).doubleSided &&
+        !sink_.backFace(flight))
+      return;
     if (emits) {
       const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
       if (emitted != Vec3(0.0f))

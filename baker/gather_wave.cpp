@@ -28,7 +28,10 @@ struct WarmSink {
   void texel(const Flight& flight, std::uint32_t texel) {
     links[flight.lane * GatherWave::kWarmRays + flight.sample] = {texel, packWeight(flight.beta)};
   }
-  void backFace(const Flight& flight) { ++texels[flight.lane].backFaces; }
+  bool backFace(const Flight& flight) {
+    ++texels[flight.lane].backFaces;
+    return true;
+  }
 };
 
 }  // namespace
@@ -40,6 +43,7 @@ struct GatherSink {
   GatheredWave& result;
   std::uint32_t page;
   std::span<const TexelCoord> coords;
+  std::span<const TexelPlace> places;
   std::size_t probedLane = kLanes;  // at most one texel of a wave is probed
   MapSums sums{};
   MapTotals totals{};
@@ -118,7 +122,10 @@ struct GatherSink {
     }
     passOnLevels(flight.lane, flight.dirTangent, flight.beta, texel, flight.depth);
   }
-  void backFace(const Flight& flight) { ++result.texels[flight.lane].backFaces; }
+  bool backFace(const Flight& flight) {
+    ++result.texels[flight.lane].backFaces;
+    return places[flight.lane] != TexelPlace::Edge;
+  }
 
   /// Hands the sums over to the result.
   void finish() {
@@ -286,9 +293,14 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
 }
 
 GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const Vec3> cache,
-                                std::span<LightSpread> spreads) {
+                                std::span<const TexelPlace> places, std::span<LightSpread> spreads) {
   GatheredWave result;
-  GatherSink sink{scene_, cache, result, page_, std::span(scene_.texels[page_].coords).subspan(first_, count_)};
+  GatherSink sink{scene_, cache, result, page_, std::span(scene_.texels[page_].coords).subspan(first_, count_), places};
+  for (std::size_t lane = 0; lane < count_; ++lane)
+    if (places[lane] == TexelPlace::Buried) points_.leaveOut(lane);
+  for (std::size_t lane = 0; lane < count_; ++lane) covered_[lane] = points_.covered(lane);
+  coveredCount_ = static_cast<std::size_t>(std::count(covered_.begin(), covered_.end(), true));
+  if (coveredCount_ == 0) return result;
   for (std::size_t lane = 0; lane < count_; ++lane)
     if ((first_ + lane) % PathIntegrator::kProbeStride == 0) sink.probedLane = lane;
   for (std::uint32_t sample = first; sample < end;) {

@@ -49,6 +49,9 @@ struct GatherScene {
   std::vector<LightStrategy> strategies{};  // of the texels' own light
 };
 
+/// Where a texel lies: in the open; partly inside of something; or wholly, where no light is gathered.
+enum class TexelPlace : std::uint8_t { Open, Edge, Buried };
+
 /// What the texels of a wave gathered in one pass: sums over its samples.
 struct GatheredTexel {
   Vec3d flat{0};
@@ -99,10 +102,11 @@ class GatherWave {
   std::array<WarmTexel, kLanes> warmUp(std::span<CacheLink> links, GatheredWave& counts);
 
   /// Samples [first, end) of every covered texel. `cache`: levels.count values per texel of the map: the radiance
-  /// that the texel reflects. `spreads`: what the wave remembers of its light from pass to pass: of each of
+  /// that the texel reflects. `places`: one per texel of the wave; nothing is gathered for buried ones, and at an edge
+  /// rays that meet backs bring nothing. `spreads`: what the wave remembers of its light from pass to pass: of each of
   /// GatherScene::strategies, and last of the gather rays; empty without strategies.
   GatheredWave gather(std::uint32_t first, std::uint32_t end, std::span<const Vec3> cache,
-                      std::span<LightSpread> spreads);
+                      std::span<const TexelPlace> places, std::span<LightSpread> spreads);
 
  private:
   Vec3 meanReflectance(std::size_t lane) const;

@@ -176,6 +176,36 @@ std::uint32_t TexelMap::nearestValid(std::size_t pageIndex, std::size_t texel,
   return best;
 }
 
+std::vector<std::uint8_t> TexelMap::buried(std::span<const std::uint8_t> hidden,
+                                           std::span<const std::uint8_t> valid) const {
+  std::vector<std::uint8_t> chartIsSeen(atlas_.charts.size(), 0);
+  std::vector<std::uint8_t> found(size(), 0);
+  for (std::size_t p = 0; p < texels_.size(); ++p)
+    for (std::size_t i = 0; i < texels_[p].size(); ++i)
+      if (valid[firstOfPage_[p] + i]) chartIsSeen[chartOf(texels_[p], i)] = 1;
+  for (std::size_t p = 0; p < texels_.size(); ++p)
+    for (std::size_t i = 0; i < texels_[p].size(); ++i)
+      if (hidden[firstOfPage_[p] + i]) found[firstOfPage_[p] + i] = chartIsSeen[chartOf(texels_[p], i)];
+  return found;
+}
+
+std::vector<std::uint8_t> TexelMap::besideBuried(std::span<const std::uint8_t> buried) const {
+  std::vector<std::uint8_t> beside(size(), 0);
+  for (std::size_t p = 0; p < texels_.size(); ++p)
+    for (std::size_t i = 0; i < texels_[p].size(); ++i) {
+      if (!buried[firstOfPage_[p] + i]) continue;
+      const std::uint32_t chart = chartOf(texels_[p], i);
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx) {
+          const TexelCoord c = texels_[p].coords[i];
+          const std::uint32_t found = at(pages_[p], c.x + dx, c.y + dy);
+          if (found != kNoTexel && !buried[found] && chartOf(texels_[p], found - firstOfPage_[p]) == chart)
+            beside[found] = 1;
+        }
+    }
+  return beside;
+}
+
 std::vector<TexelMap::Substitute> TexelMap::substitutes(std::span<const std::uint8_t> valid) const {
   std::vector<Substitute> all;
   for (std::uint32_t t = 0; t < valid.size(); ++t)

@@ -41,6 +41,11 @@ WavePoints::WavePoints(const RayScene& rays, const Atlas& atlas, const PageTexel
   }
 }
 
+void WavePoints::leaveOut(std::size_t lane) {
+  leftOut_[lane] = true;
+  for (PointLanes& point : points_) point.light.active[lane] = false;
+}
+
 void WavePoints::addTexel(const RayScene& rays, const Atlas& atlas, const TexelFootprint& footprint,
                           std::size_t lane) {
   const auto firstSource = static_cast<std::uint32_t>(sources_.size());

@@ -36,7 +36,9 @@ class WavePoints {
 
   /// Covered area in texels; 0: nothing to sample.
   double area(std::size_t lane) const { return areas_[lane]; }
-  bool covered(std::size_t lane) const { return areas_[lane] > 0; }
+  bool covered(std::size_t lane) const { return areas_[lane] > 0 && !leftOut_[lane]; }
+  /// From now on the lane is without a texel. Precondition: nothing was drawn.
+  void leaveOut(std::size_t lane);
 
   /// Draws samples [first, first + count) of a pattern, count <= kMost a power of two: point i of every texel is its
   /// sample first + i, uniform over the texel's covered area.
@@ -74,6 +76,7 @@ class WavePoints {
   void store(std::size_t lane, std::uint32_t i, const Place& place);
 
   std::array<double, kLanes> areas_{};
+  std::array<bool, kLanes> leftOut_{};
   std::vector<Source> sources_;
   std::vector<Piece> pieces_;                            // lane by lane
   std::array<std::uint32_t, kLanes + 1> firstPiece_{};  // of each lane

@@ -25,6 +25,8 @@ constexpr std::uint32_t kFootprint = kLightPatterns;
 constexpr std::uint32_t kDirection = kLightPatterns + 1;
 constexpr std::uint32_t kPoints = WavePoints::kMost;
 
+constexpr std::array<TexelPlace, kLanes> kOpen{};
+
 enum Place : int { Rooms, Foliage };
 
 /// A scene ready to gather in, its cache filled with arbitrary light.
@@ -211,7 +213,7 @@ void compare(benchmark::State& state, int place, std::uint32_t samples, TraceMod
         naive += cpuSeconds() - start;
         start = cpuSeconds();
         GatherWave wave(scene, 0, first, kLanes);
-        const GatheredWave done = wave.gather(0, samples, f.cache);
+        const GatheredWave done = wave.gather(0, samples, f.cache, kOpen, {});
         gather += cpuSeconds() - start;
         for (const GatheredTexel& texel : done.texels) gatherSum += texel.flat.x;
         rays += static_cast<double>(done.rays);
@@ -251,7 +253,7 @@ void gather(benchmark::State& state) {
   for (auto _ : state)
     for (const std::size_t first : firsts) {
       GatherWave wave(f.scene, 0, first, kLanes);
-      rays += static_cast<std::int64_t>(wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache).rays);
+      rays += static_cast<std::int64_t>(wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache, kOpen, {}).rays);
     }
   state.SetItemsProcessed(rays);
 }
