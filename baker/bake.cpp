@@ -210,8 +210,7 @@ Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vec
   const Materials materials(scene, options.bounces != 0, notes);
   auto rays = RayScene::build(scene, materials);
   if (!rays) return rays.error();
-  const float extent = glm::length((*rays)->boundsMax() - (*rays)->boundsMin());
-  const PunctualLights punctual(scene.lights, extent);
+  const PunctualLights punctual(scene.lights);
   const EmissiveTriangles emissive(**rays, materials);
   const EnvironmentLight environment(scene.environment);
   const LightTransport transport{**rays, materials, punctual, emissive, environment};

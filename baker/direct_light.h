@@ -27,15 +27,16 @@ enum LightPattern : std::uint32_t { kPunctual, kEmitter, kEmitterPoint, kSun, kS
 
 /// One way to take a light sample. All that a scene needs (lightStrategies) add up to its direct light.
 struct LightStrategy {
-  enum Kind { EveryPunctual, OnePunctual, Emissive, Sun, Sky };
+  enum Kind { EveryPunctual, NearPunctual, OnePunctual, Emissive, Sun, Sky };
   Kind kind = EveryPunctual;
   std::size_t light = 0;  // of OnePunctual
 };
 
-/// Scenes with no more punctual lights than this may sample each by itself.
+/// No more punctual lights than this are sampled each by itself.
 inline constexpr std::size_t kSeparateLights = 8;
 
-/// `separate`: a strategy for each punctual light, where there are few; else one that chooses among them.
+/// `separate`: a strategy for each punctual light, where there are few; of more, for each directional one, if these are
+/// few, and one that chooses among the rest. Else one that chooses among all.
 std::vector<LightStrategy> lightStrategies(const LightTransport& transport, bool separate);
 
 /// The lanes of a wave that want light: those that are `active`.
@@ -85,6 +86,11 @@ std::uint64_t sampleLight(const LightTransport& transport, const LightStrategy& 
     case LightStrategy::EveryPunctual: {
       const UnitLanes choice = samples.draw1D(patternBase + kPunctual);
       estimate([&](const Receiver& r, int lane) { return transport.punctual.sample(r.p, r.ns, choice.u[lane]); });
+      break;
+    }
+    case LightStrategy::NearPunctual: {
+      const UnitLanes choice = samples.draw1D(patternBase + kPunctual);
+      estimate([&](const Receiver& r, int lane) { return transport.punctual.sampleNear(r.p, r.ns, choice.u[lane]); });
       break;
     }
     case LightStrategy::OnePunctual:

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "baker/distribution.h"
+#include "baker/light_tree.h"
 #include "baker/materials.h"
 #include "baker/ray_scene.h"
 #include "scene/scene.h"
@@ -25,25 +25,33 @@ struct LightSample {
 class PunctualLights {
  public:
   PunctualLights() = default;
-  /// Lights that can send nothing are dropped. `extent`: size of the scene, to weigh lights at infinity against others.
-  PunctualLights(const std::vector<Light>& lights, float extent);
+  /// Lights that can send nothing are dropped. Directional lights come first.
+  explicit PunctualLights(const std::vector<Light>& lights);
 
   bool empty() const { return lights_.empty(); }
   std::size_t size() const { return lights_.size(); }
+  std::size_t directional() const { return directional_; }
 
   /// Density over lights: in proportion to what arrives unshadowed from each above the surface, up to a cosine
-  /// ((1 + 2 cosTheta) / 3, so that the tilted basis vectors' weights stay bounded); where there are more than
-  /// kLocalLights, in proportion to power.
-  LightSample sample(const Vec3& p, const Vec3& n, float u) const;
-
+  /// ((1 + 2 cosTheta) / 3, so that the tilted basis vectors' weights stay bounded). Beyond kLocalLights a tree
+  /// (LightTree) estimates that for groups of lights.
+  LightSample sample(const Vec3& p, const Vec3& n, float u) const { return choose(0, p, n, u); }
+  /// The same, without the directional lights.
+  LightSample sampleNear(const Vec3& p, const Vec3& n, float u) const { return choose(directional_, p, n, u); }
   /// What light `index` brings, without a choice.
   LightSample sampleOne(std::size_t index, const Vec3& p) const;
 
   static constexpr std::size_t kLocalLights = 32;
 
  private:
+  LightSample choose(std::size_t first, const Vec3& p, const Vec3& n, float u) const;
+  LightSample chooseAmong(std::size_t first, std::size_t end, float treeImportance, const Vec3& p, const Vec3& n,
+                          float u) const;
+  float importance(std::size_t light, const Vec3& p, const Vec3& n) const;
+
   std::vector<Light> lights_;
-  Distribution byPower_;  // only with more than kLocalLights
+  std::size_t directional_ = 0;
+  LightTree tree_;  // over lights_, only with more than kLocalLights that are not directional
 };
 
 /// Irradiance that a punctual light brings to a surface at p that faces it: colour * candela / d^2 with the range
@@ -57,39 +65,59 @@ class EmissiveTriangles {
   /// Finds them and sets ScenePart::firstEmitter.
   EmissiveTriangles(RayScene& rays, const Materials& materials);
 
-  bool empty() const { return choice_.empty(); }
+  bool empty() const { return tree_.empty(); }
   std::size_t size() const { return triangles_.size(); }
 
-  /// Density: over triangles by power (mean emitted luminance, integrated roughly over the texture, times area),
-  /// uniform by area within. Emission from the front alone unless the material is doubleSided, times opacity.
+  /// Density: over triangles by what they can bring to p unshadowed, estimated for groups of them (LightTree) and for
+  /// the few of a group by mean emitted luminance (roughly, over the texture) times solid angle; within a triangle
+  /// uniform by solid angle where that is not small, else by area. Emission from the front alone unless the material
+  /// is doubleSided, times opacity.
   LightSample sample(const Vec3& p, float uTriangle, Vec2 uPoint) const;
 
   /// The density per solid angle with which sample() from `origin` takes the point that a ray hit. Zero for triangles
   /// that are never chosen.
   float pdf(const HitSurface& hit, const Vec3& origin) const;
 
+  /// Triangles that look smaller, in steradians, are sampled by area, which is quicker and nearly the same; and so are
+  /// those that fill nearly a hemisphere, where spherical triangles degenerate.
+  static constexpr float kLeastSolidAngle = 0.03f;
+  static constexpr float kMostSolidAngle = 6.2f;
+
  private:
   struct Emitter {
     Vec3 corner{0};  // world
     Vec3 e1{0};      // to the other corners
     Vec3 e2{0};
-    Vec3 ng{0};                  // unit, front
-    float offsetMeters = 0.0f;   // of the ends of shadow rays
-    float densityByArea = 0.0f;  // probability of choosing it over its area
+    Vec3 ng{0};  // unit, front
+    float doubleArea = 0.0f;
+    float offsetMeters = 0.0f;  // of the ends of shadow rays
+    float luminance = 0.0f;     // mean of what it sends out
     std::uint32_t part = 0;
     std::uint32_t triangle = 0;
     bool doubleSided = false;
     bool uniform = false;  // it sends out `radiance` everywhere
     Vec3 radiance{0};
   };
-  /// Fills all but densityByArea from the part and the triangle; returns the area.
-  float describe(Emitter& emitter) const;
+  /// Fills all from the part and the triangle.
+  void describe(Emitter& emitter) const;
   Vec3 radianceAt(const Emitter& emitter, Vec2 barycentric) const;
+  /// The corners as p sees them, and what their solid angle is made of (sampling.h); volume is 0 from the side that
+  /// does not shine.
+  struct View {
+    Vec3 a, b, c;
+    float volume = 0.0f;
+  };
+  static View viewOf(const Emitter& emitter, const Vec3& p);
+  static float solidAngle(const Emitter& emitter, const Vec3& p);
+  /// Mean luminance times solid angle to half a percent, for the choice.
+  float importance(std::uint32_t triangle, const Vec3& p) const;
+  static Vec2 samplePoint(const Emitter& emitter, const Vec3& p, float solidAngle, Vec2 u);
+  static bool bySolidAngle(float solidAngle) { return solidAngle > kLeastSolidAngle && solidAngle < kMostSolidAngle; }
 
   const RayScene* rays_ = nullptr;
   const Materials* materials_ = nullptr;
   std::vector<Emitter> triangles_;
-  Distribution choice_;
+  LightTree tree_;
 };
 
 /// Radiance that leaves a surface found by a ray towards the ray's origin.

@@ -66,6 +66,71 @@ inline Vec2 invertTriangle(Vec2 barycentric) {
   return {root * root, root > 0 ? barycentric.y / root : 0.0f};
 }
 
+/// tan(solidAngle / 2) of a triangle seen from the origin as volume / below, for corners in any order (Van Oosterom and
+/// Strackee 1983). volume = |dot(a, cross(b - a, c - a))|; taken from the edges it is accurate for small triangles.
+template <class V, class T>
+T belowSolidAngle(const V& a, const V& b, const V& c) {
+  const T la = glm::length(a);
+  const T lb = glm::length(b);
+  const T lc = glm::length(c);
+  return la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb;
+}
+
+/// 0 where the origin lies in the triangle's plane.
+template <class V, class T>
+T triangleSolidAngle(const V& a, const V& b, const V& c, T volume) {
+  return volume > T(0) ? T(2) * std::atan2(volume, belowSolidAngle<V, T>(a, b, c)) : T(0);
+}
+
+/// A triangle on the unit sphere, its corners unit vectors. Density: 1 / solidAngle (Arvo 1995, "Stratified Sampling of
+/// Spherical Triangles"). Precondition: not degenerate.
+struct SphericalTriangle {
+  Vec3d a, b, c;
+
+  double solidAngle() const { return triangleSolidAngle(a, b, c, std::abs(glm::dot(a, glm::cross(b, c)))); }
+
+  /// u.x chooses the part cut off by an arc from b to the opposite edge, u.y the place on that arc.
+  /// `angle`: solidAngle(), which the caller has.
+  Vec3d sample(Vec2 u, double angle) const {
+    const Vec3d ab = glm::cross(a, b);
+    const Vec3d ac = glm::cross(a, c);
+    const double scale = 1.0 / std::sqrt(glm::dot(ab, ab) * glm::dot(ac, ac));
+    const double cosAlpha = glm::dot(ab, ac) * scale;
+    // Not from the cosine, which is blind where the angle is small. (cross(ab, ac) = a * volume.)
+    const double sinAlpha = std::abs(glm::dot(a, glm::cross(b, c))) * scale;
+    const double part = static_cast<double>(u.x) * angle;
+    const double sinPart = std::sin(part);
+    const double cosPart = std::cos(part);
+    const double s = sinPart * cosAlpha - cosPart * sinAlpha;  // of part - alpha
+    const double t = cosPart * cosAlpha + sinPart * sinAlpha;
+    const double across = t - cosAlpha;
+    const double along = s + sinAlpha * glm::dot(a, b);
+    const double below = (along * s + across * t) * sinAlpha;
+    const double q = std::clamp(((along * t - across * s) * cosAlpha - along) / below, -1.0, 1.0);
+    const Vec3d end = below != 0.0 ? arcPoint(a, c, q) : a;
+    const double z = 1.0 - static_cast<double>(u.y) * (1.0 - glm::dot(end, b));
+    return arcPoint(b, end, z);
+  }
+  Vec2 invert(const Vec3d& w) const {
+    Vec3d end = glm::cross(glm::cross(b, w), glm::cross(c, a));
+    if (!(glm::dot(end, end) > 0.0)) return {0.0f, 0.0f};  // at b
+    end = glm::normalize(glm::dot(end, a + c) < 0.0 ? -end : end);
+    const double part = SphericalTriangle{a, b, end}.solidAngle() / solidAngle();
+    const Vec3d toW = w - b;
+    const Vec3d toEnd = end - b;
+    return {static_cast<float>(part), static_cast<float>(glm::dot(toW, toW) / glm::dot(toEnd, toEnd))};
+  }
+
+ private:
+  /// The point at cosine z from `from` on the arc towards `to`.
+  static Vec3d arcPoint(const Vec3d& from, const Vec3d& to, double z) {
+    const Vec3d side = to - from * glm::dot(from, to);
+    const double length = glm::length(side);
+    if (!(length > 0.0)) return from;
+    return from * z + side * (std::sqrt(std::max(0.0, (1.0 - z) * (1.0 + z))) / length);
+  }
+};
+
 /// Weight of a sample taken with density `pdf` where another technique would take it with `other` (Veach 1997, the
 /// power heuristic with exponent 2, one sample of each). An `other` of zero gives 1, an infinite one 0.
 inline float misWeight(float pdf, float other) {

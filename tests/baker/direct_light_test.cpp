@@ -55,6 +55,70 @@ TEST(DirectLight, PointLight) {
   }));
 }
 
+// A thousand lamps over the floor, more than can each be asked: by both integrators.
+TEST(DirectLight, ManyPointLights) {
+  Ground ground;
+  std::vector<Light>& lights = ground.test.scene.lights;
+  for (int i = 0; i < 1000; ++i) {
+    Light light;
+    light.position = {0.37f * static_cast<float>(i % 40) - 7.0f, 0.3f + 0.1f * static_cast<float>(i % 7),
+                      0.5f * static_cast<float>(i / 40) - 6.0f};
+    light.intensity = 0.5f + 0.25f * static_cast<float>(i % 11);
+    lights.push_back(light);
+  }
+  for (const Integrator integrator : {Integrator::Path, Integrator::Gather}) {
+    ground.test.integrator = integrator;
+    expectAgreement(deviation(ground.test, {.samples = 1024, .bounces = 0}, ground.page, [&](const Vec3d& p) {
+      Maps sum{};
+      for (const Light& light : lights) {
+        const Vec3d d = Vec3d(light.position) - p;
+        const Maps one = ground.fromDirection(glm::normalize(d), static_cast<double>(light.intensity) / glm::dot(d, d));
+        for (std::size_t i = 0; i < 4; ++i) sum[i] += one[i];
+      }
+      return sum;
+    }));
+  }
+}
+
+// Three lamps and a sun, a wall that hides each from a part of the floor: the gather's light samples go where shadows
+// lie, and do not lean to either side.
+TEST(DirectLight, SamplesThatFollowShadowsStayUnbiased) {
+  Ground ground(8);
+  // It stands askew: shadow borders along the grid would be met badly by the midpoints of the closed form.
+  ground.test.addRectangle({-0.62f, 0, -1.2f}, {0, 0.5f, 0}, {0.84f, 0, 2.4f}, {.texels = 0});
+  const Vec3 places[3] = {{-0.8f, 0.6f, 0.3f}, {0.7f, 0.9f, -0.4f}, {0.2f, 1.5f, 0.0f}};
+  for (const Vec3& place : places) {
+    Light light;
+    light.position = place;
+    light.intensity = 3.0f;
+    ground.test.scene.lights.push_back(light);
+  }
+  Light sun;
+  sun.type = LightType::Directional;
+  sun.direction = glm::normalize(Vec3(-1, -1, 0.2f));
+  sun.intensity = 2.0f;
+  ground.test.scene.lights.push_back(sun);
+  ground.test.integrator = Integrator::Gather;
+  const auto lit = [](const Vec3d& p, const Vec3d& toLight, double length) {
+    const double t = (0.35 * p.z - p.x - 0.2) / (toLight.x - 0.35 * toLight.z);
+    if (!(t > 0) || t > length) return true;
+    return p.y + t * toLight.y > 0.5 || std::abs(p.z + t * toLight.z) > 1.2;
+  };
+  expectAgreement(deviation(ground.test, {.samples = 256, .bounces = 0}, ground.page, [&](const Vec3d& p) {
+    Maps sum{};
+    for (const Light& light : ground.test.scene.lights) {
+      const bool isSun = light.type == LightType::Directional;
+      const Vec3d d = isSun ? -Vec3d(light.direction) : Vec3d(light.position) - p;
+      const double length = glm::length(d);
+      if (!lit(p, d / length, isSun ? 1e9 : length)) continue;
+      const Maps one =
+          ground.fromDirection(d / length, static_cast<double>(light.intensity) / (isSun ? 1.0 : length * length));
+      for (std::size_t i = 0; i < 4; ++i) sum[i] += one[i];
+    }
+    return sum;
+  }));
+}
+
 TEST(DirectLight, PointLightRange) {
   Ground ground;
   Light light;

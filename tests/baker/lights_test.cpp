@@ -178,7 +178,7 @@ TEST(PunctualLights, ChoiceIsProportionalToWhatArrives) {
   far.position = {0, 3, 0};
   behind.position = {0, -1, 0};
   behind.intensity = 100.0f;
-  const PunctualLights lights({behind, near, far}, 10.0f);
+  const PunctualLights lights({behind, near, far});
   // Both have the same direction: with u below the near one's share (1 / (1 + 1/9)) it is chosen, and the weight is the
   // sum of both irradiances either way.
   for (const float u : {0.0f, 0.5f, 0.89f, 0.91f, 0.999999f}) {
@@ -187,10 +187,10 @@ TEST(PunctualLights, ChoiceIsProportionalToWhatArrives) {
     EXPECT_NEAR(s.weight.x, 1.0f + 1.0f / 9, 1e-5f);
     EXPECT_EQ(s.pdf, 0.0f);
   }
-  EXPECT_EQ(PunctualLights({}, 1.0f).size(), 0u);
+  EXPECT_EQ(PunctualLights(std::vector<Light>{}).size(), 0u);
   Light off;
   off.intensity = 0.0f;
-  EXPECT_TRUE(PunctualLights({off}, 1.0f).empty());
+  EXPECT_TRUE(PunctualLights({off}).empty());
 }
 
 }  // namespace

@@ -153,5 +153,77 @@ TEST(Distribution, DegenerateWeights) {
   EXPECT_EQ(one.probability(1), 1.0f);
 }
 
+std::vector<SphericalTriangle> sphericalTriangles() {
+  const auto at = [](double x, double y, double z) { return glm::normalize(Vec3d(x, y, z)); };
+  return {
+      {at(1, 0, 0), at(0, 1, 0), at(0, 0, 1)},                    // an octant
+      {at(1, 0, 0.1), at(-1, 0.2, 0.1), at(-0.8, -1, 0.1)},       // nearly a hemisphere
+      {at(1, 0, 4), at(0.9, 0.2, 4), at(1.1, 0.1, 4)},            // small
+      {at(-5, 0.01, 1), at(5, 0.01, 1), at(0, -0.01, 1)},         // long and thin
+      {at(0, 0, 1), at(0.003, 0, 1), at(3, 0.3, 1)},              // a needle
+      {at(1e-3, 0, 1), at(-1e-3, 1e-3, 1), at(-1e-3, -1e-3, 1)},  // tiny
+  };
+}
+
+TEST(SphericalTriangle, SolidAngles) {
+  const std::vector<SphericalTriangle> triangles = sphericalTriangles();
+  EXPECT_NEAR(triangles[0].solidAngle(), std::numbers::pi / 2, 1e-12);
+  // Seen from straight above, a tiny triangle's solid angle is its area.
+  EXPECT_NEAR(triangles[5].solidAngle() / 2e-6, 1.0, 1e-5);
+  // In float as in double, from the edges.
+  const Vec3 a(0.3f, 0.2f, 2.0f), e1(0.02f, 0, 0), e2(0, 0.03f, 0.01f);
+  const SphericalTriangle same{glm::normalize(Vec3d(a)), glm::normalize(Vec3d(a + e1)), glm::normalize(Vec3d(a + e2))};
+  const float angle = triangleSolidAngle(a, a + e1, a + e2, std::abs(glm::dot(a, glm::cross(e1, e2))));
+  EXPECT_NEAR(static_cast<double>(angle) / same.solidAngle(), 1.0, 1e-5);
+  EXPECT_EQ(triangleSolidAngle(a, a, a, 0.0f), 0.0f);
+}
+
+TEST(SphericalTriangle, RoundTrips) {
+  for (const SphericalTriangle& triangle : sphericalTriangles())
+    for (std::uint32_t i = 0; i < 512; ++i) {
+      const Vec2 u = sobol2D(i, 3);
+      const Vec3d w = triangle.sample(u, triangle.solidAngle());
+      EXPECT_NEAR(glm::length(w), 1.0, 1e-9);
+      const Vec2 back = triangle.invert(w);
+      // Near the corner b all u.x meet.
+      EXPECT_NEAR(back.x, u.x, 1e-4f / std::max(0.01f, std::sqrt(u.y)));
+      EXPECT_NEAR(back.y, u.y, 1e-4f);
+    }
+}
+
+// The four triangles between the corners and the edges' midpoints receive samples by their solid angle, on two levels.
+TEST(SphericalTriangle, UniformBySolidAngle) {
+  const auto split = [](const SphericalTriangle& t) {
+    const Vec3d ab = glm::normalize(t.a + t.b), bc = glm::normalize(t.b + t.c), ca = glm::normalize(t.c + t.a);
+    return std::array<SphericalTriangle, 4>{{{t.a, ab, ca}, {ab, t.b, bc}, {ca, bc, t.c}, {ab, bc, ca}}};
+  };
+  const auto holds = [](const SphericalTriangle& t, const Vec3d& w) {
+    const double turn = glm::dot(t.a, glm::cross(t.b, t.c)) < 0 ? -1 : 1;
+    return turn * glm::dot(w, glm::cross(t.a, t.b)) >= 0 && turn * glm::dot(w, glm::cross(t.b, t.c)) >= 0 &&
+           turn * glm::dot(w, glm::cross(t.c, t.a)) >= 0;
+  };
+  constexpr int kSamples = 1 << 14;
+  for (const SphericalTriangle& triangle : sphericalTriangles()) {
+    std::vector<SphericalTriangle> parts;
+    for (const SphericalTriangle& part : split(triangle))
+      for (const SphericalTriangle& small : split(part)) parts.push_back(small);
+    std::vector<int> counts(parts.size());
+    int inside = 0;
+    for (std::uint32_t i = 0; i < kSamples; ++i) {
+      const Vec3d w = triangle.sample(sobol2D(i, 4), triangle.solidAngle());
+      for (std::size_t k = 0; k < parts.size(); ++k)
+        if (holds(parts[k], w)) {
+          ++counts[k];
+          ++inside;
+          break;
+        }
+    }
+    EXPECT_GE(inside, kSamples - 20);  // the rest within rounding of an edge
+    for (std::size_t k = 0; k < parts.size(); ++k)
+      // A stratified sequence: errors grow with the length of the border, about the root of the number.
+      EXPECT_NEAR(counts[k], kSamples * parts[k].solidAngle() / triangle.solidAngle(), 40.0) << k;
+  }
+}
+
 }  // namespace
 }  // namespace lumel

@@ -1,0 +1,202 @@
+#include "baker/light_tree.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "baker/sobol.h"
+
+namespace lumel {
+namespace {
+
+constexpr int kBins = 12;
+/// Levels below which groups are halved by number, so that the depth stays bounded.
+constexpr int kHalveBelow = 32;
+
+/// Mean of 1 + 2 cosTheta over a hemisphere.
+constexpr float kAnySide = 2.0f;
+
+float sineOf(float cosine) { return std::sqrt(std::max(0.0f, 1.0f - cosine * cosine)); }
+
+/// Cosine and sine of max(0, a - b) for angles in [0, pi] given by theirs.
+struct Angle {
+  float cosine = 1.0f;
+  float sine = 0.0f;
+};
+Angle lessened(const Angle& a, const Angle& b) {
+  if (a.cosine > b.cosine) return {};
+  return {a.cosine * b.cosine + a.sine * b.sine, a.sine * b.cosine - a.cosine * b.sine};
+}
+
+/// The smallest cone about two: its axis lies between theirs.
+void uniteCones(LightBounds& a, const LightBounds& b) {
+  a.cosEmit = std::min(a.cosEmit, b.cosEmit);
+  const float angleA = std::acos(std::clamp(a.cosSpread, -1.0f, 1.0f));
+  const float angleB = std::acos(std::clamp(b.cosSpread, -1.0f, 1.0f));
+  const float between = std::acos(std::clamp(glm::dot(a.axis, b.axis), -1.0f, 1.0f));
+  if (std::min(between + angleB, kPi) <= angleA) return;
+  if (std::min(between + angleA, kPi) <= angleB) {
+    a.axis = b.axis;
+    a.cosSpread = b.cosSpread;
+    return;
+  }
+  const float angle = 0.5f * (angleA + between + angleB);
+  const Vec3 side = b.axis - a.axis * glm::dot(a.axis, b.axis);
+  const float length = glm::length(side);
+  if (!(angle < kPi) || !(length > 1e-6f)) {
+    a.cosSpread = -1.0f;
+    return;
+  }
+  const float turn = angle - angleA;
+  a.axis = glm::normalize(a.axis * std::cos(turn) + side * (std::sin(turn) / length));
+  // A little wider, for rounding.
+  a.cosSpread = std::cos(std::min(kPi, angle + 1e-3f));
+}
+
+void unite(LightBounds& a, const LightBounds& b) {
+  if (!(a.power > 0.0f)) {
+    a = b;
+    return;
+  }
+  if (!(b.power > 0.0f)) return;
+  a.min = glm::min(a.min, b.min);
+  a.max = glm::max(a.max, b.max);
+  a.power += b.power;
+  a.reach = std::max(a.reach, b.reach);
+  uniteCones(a, b);
+}
+
+/// Cost of a group (Conty Estevez and Kulla, eq. 1): power times the measure of the directions that it shines in times
+/// its surface.
+float groupCost(const LightBounds& bounds) {
+  const float spread = std::acos(std::clamp(bounds.cosSpread, -1.0f, 1.0f));
+  const float emit = std::acos(std::clamp(bounds.cosEmit, -1.0f, 1.0f));
+  const float all = std::min(kPi, spread + emit);
+  const float directions =
+      2.0f * kPi * (1.0f - std::cos(spread)) + 0.5f * kPi *
+                                                   (2.0f * all * std::sin(spread) - std::cos(spread - 2.0f * all) -
+                                                    2.0f * spread * std::sin(spread) + std::cos(spread));
+  const Vec3 size = bounds.max - bounds.min;
+  // The diagonal keeps groups on a line apart.
+  const float surface = 2.0f * (size.x * size.y + size.y * size.z + size.z * size.x) + glm::dot(size, size);
+  return bounds.power * std::max(directions, 1e-3f) * surface;
+}
+
+Vec3 centreOf(const LightBounds& bounds) { return 0.5f * (bounds.min + bounds.max); }
+
+struct Split {
+  int axis = -1;
+  float at = 0.0f;  // centres below go to the left
+};
+
+Split bestSplit(std::span<const LightBounds> lights, std::span<const std::uint32_t> group) {
+  Vec3 least(std::numeric_limits<float>::max());
+  Vec3 most(std::numeric_limits<float>::lowest());
+  for (const std::uint32_t light : group) {
+    least = glm::min(least, centreOf(lights[light]));
+    most = glm::max(most, centreOf(lights[light]));
+  }
+  const Vec3 size = most - least;
+  const float longest = std::max({size.x, size.y, size.z});
+  Split best;
+  float bestCost = std::numeric_limits<float>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(size[axis] > 0.0f)) continue;
+    std::array<LightBounds, kBins> bins;
+    const float scale = kBins / size[axis];
+    for (const std::uint32_t light : group) {
+      const float place = (centreOf(lights[light])[axis] - least[axis]) * scale;
+      unite(bins[static_cast<std::size_t>(std::clamp(place, 0.0f, kBins - 1.0f))], lights[light]);
+    }
+    std::array<float, kBins> below{};
+    LightBounds sum;
+    for (std::size_t i = 0; i + 1 < kBins; ++i) {
+      unite(sum, bins[i]);
+      below[i + 1] = sum.power > 0.0f ? groupCost(sum) : 0.0f;
+    }
+    sum = {};
+    for (std::size_t i = kBins - 1; i > 0; --i) {
+      unite(sum, bins[i]);
+      // Thin slices are worse than the surface alone says.
+      const float cost = (below[i] + (sum.power > 0.0f ? groupCost(sum) : 0.0f)) * (longest / size[axis]);
+      if (cost < bestCost) {
+        bestCost = cost;
+        best = {axis, least[axis] + static_cast<float>(i) / scale};
+      }
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+double refine(float u, const Vec3& p) {
+  std::uint32_t bits = hashBits(std::bit_cast<std::uint32_t>(u));
+  for (int i = 0; i < 3; ++i) bits = hashCombine(bits, std::bit_cast<std::uint32_t>(p[i]));
+  return static_cast<double>(u) + static_cast<double>(bits) * 0x1p-56;
+}
+
+LightTree::LightTree(std::span<const LightBounds> lights) {
+  leafOf_.assign(lights.size(), kNone);
+  for (std::uint32_t i = 0; i < lights.size(); ++i)
+    if (lights[i].power > 0.0f && std::isfinite(lights[i].power)) order_.push_back(i);
+  if (!order_.empty()) build(lights, 0, order_.size(), kNone, 0);
+}
+
+void LightTree::build(std::span<const LightBounds> lights, std::size_t first, std::size_t count, std::uint32_t parent,
+                      int depth) {
+  const auto at = static_cast<std::uint32_t>(nodes_.size());
+  nodes_.emplace_back().parent = parent;
+  const std::span<std::uint32_t> group = std::span(order_).subspan(first, count);
+  LightBounds bounds;
+  for (const std::uint32_t light : group) unite(bounds, lights[light]);
+  nodes_[at].bounds = bounds;
+  if (count <= kLeaf) {
+    nodes_[at].first = static_cast<std::uint32_t>(first);
+    nodes_[at].count = static_cast<std::uint32_t>(count);
+    for (const std::uint32_t light : group) leafOf_[light] = at;
+    return;
+  }
+  std::size_t left = 0;
+  if (depth < kHalveBelow) {
+    if (const Split split = bestSplit(lights, group); split.axis >= 0)
+      left = static_cast<std::size_t>(
+          std::stable_partition(group.begin(), group.end(),
+                                [&](std::uint32_t light) { return centreOf(lights[light])[split.axis] < split.at; }) -
+          group.begin());
+  }
+  // All in one place, or borders lost to rounding.
+  if (left == 0 || left == count) left = count / 2;
+  build(lights, first, left, at, depth + 1);
+  nodes_[at].right = static_cast<std::uint32_t>(nodes_.size());
+  build(lights, first + left, count - left, at, depth + 1);
+}
+
+float LightTree::importanceOf(const LightBounds& bounds, const LightQuery& query) {
+  const Vec3 toCentre = centreOf(bounds) - query.p;
+  const Vec3 half = 0.5f * (bounds.max - bounds.min);
+  const float distance2 = glm::dot(toCentre, toCentre);
+  const float radius2 = glm::dot(half, half);
+  if (std::isfinite(bounds.reach)) {
+    const Vec3 outside = glm::max(glm::abs(toCentre) - half, Vec3(0.0f));
+    if (glm::dot(outside, outside) > bounds.reach * bounds.reach) return 0.0f;
+  }
+  // From inside of the bounding sphere lights may lie in any direction and shine from any side.
+  if (!(distance2 > radius2)) return radius2 > 0.0f ? kAnySide * bounds.power / radius2 : 0.0f;
+  const Vec3 wi = toCentre / std::sqrt(distance2);
+  const float sineAround = std::sqrt(radius2 / distance2);
+  // A little wider than the sphere looks, for rounding.
+  const Angle around{sineOf(sineAround) - 1e-4f, std::min(1.0f, sineAround + 1e-4f)};
+  const float cosAxis = std::clamp(-glm::dot(bounds.axis, wi), -1.0f, 1.0f);
+  const Angle off =
+      lessened(lessened({cosAxis, sineOf(cosAxis)}, {bounds.cosSpread, sineOf(bounds.cosSpread)}), around);
+  if (off.cosine <= bounds.cosEmit) return 0.0f;
+  const float importance = bounds.power * off.cosine / distance2;
+  if (query.n == Vec3(0.0f)) return kAnySide * importance;
+  const float cosTheta = std::clamp(glm::dot(query.n, wi), -1.0f, 1.0f);
+  const float most = lessened({cosTheta, sineOf(cosTheta)}, around).cosine;
+  // As for directions: the tilted basis vectors need light at grazing angles.
+  return most > 0.0f ? importance * (1.0f + 2.0f * most) : 0.0f;
+}
+
+}  // namespace lumel

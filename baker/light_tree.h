@@ -1,0 +1,152 @@
+// A tree over many lights: descends by how much each half can bring to a point, so that the choice of a light costs
+// the logarithm of their number, and the density of the choice is known exactly.
+// Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting" (the tree and its
+// importance; without the splitting).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "scene/math.h"
+
+namespace lumel {
+
+/// Bounds on where a light, or a group of lights, lies and where to it shines.
+struct LightBounds {
+  Vec3 min{0};  // world
+  Vec3 max{0};
+  Vec3 axis{0, 0, 1};      // of the cone that holds all directions in which its surfaces face
+  float cosSpread = 1.0f;  // half angle of that cone; -1: faces everywhere
+  float cosEmit = 0.0f;    // how far from the way it faces a light shines; 0: a hemisphere
+  float power = 0.0f;
+  float reach = std::numeric_limits<float>::infinity();  // it brings nothing to points further away
+};
+
+/// A point that asks for light. A normal of zero leaves the side open.
+struct LightQuery {
+  Vec3 p{0};
+  Vec3 n{0};
+};
+
+class LightTree {
+ public:
+  static constexpr std::size_t kLeaf = 4;
+
+  LightTree() = default;
+  /// Lights whose power is not positive and finite are never chosen. Deterministic. Memory: about 80 bytes per light.
+  explicit LightTree(std::span<const LightBounds> lights);
+
+  bool empty() const { return nodes_.empty(); }
+
+  struct Choice {
+    std::uint32_t light = 0;
+    float probability = 0.0f;  // 0: nothing can arrive
+  };
+  /// u in [0, 1). Among the few lights of a leaf `importance(light)` >= 0 decides, which must not be zero for a light
+  /// that brings anything. The probabilities of all lights add up to 1, or to less where whole leaves turn out to
+  /// bring nothing.
+  template <class Importance>
+  Choice choose(const LightQuery& query, float u, Importance importance) const;
+
+  /// With which choose() takes `light`: to rounding.
+  template <class Importance>
+  float probability(const LightQuery& query, std::uint32_t light, Importance importance) const;
+
+  /// An estimate of what all lights together bring, for weighing the tree against other lights.
+  float importance(const LightQuery& query) const { return empty() ? 0.0f : importanceOf(nodes_[0].bounds, query); }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+  struct Node {
+    LightBounds bounds;
+    std::uint32_t parent = kNone;
+    std::uint32_t right = 0;  // the left child follows its parent
+    std::uint32_t first = 0;  // into order_
+    std::uint32_t count = 0;  // 0: not a leaf
+  };
+  static float importanceOf(const LightBounds& bounds, const LightQuery& query);
+  void build(std::span<const LightBounds> lights, std::size_t first, std::size_t count, std::uint32_t parent,
+             int depth);
+  template <class Importance>
+  float leafImportances(const Node& leaf, Importance importance, std::array<float, kLeaf>& each) const;
+
+  std::vector<Node> nodes_;
+  std::vector<std::uint32_t> order_;   // lights, leaf by leaf
+  std::vector<std::uint32_t> leafOf_;  // per light; kNone: never chosen
+};
+
+/// u with random bits below those that a float holds: halving an interval over and over would run out of them.
+double refine(float u, const Vec3& p);
+
+template <class Importance>
+float LightTree::leafImportances(const Node& leaf, Importance importance, std::array<float, kLeaf>& each) const {
+  float total = 0.0f;
+  for (std::uint32_t i = 0; i < leaf.count; ++i) total += each[i] = importance(order_[leaf.first + i]);
+  return total;
+}
+
+template <class Importance>
+LightTree::Choice LightTree::choose(const LightQuery& query, float u, Importance importance) const {
+  if (empty()) return {};
+  std::uint32_t at = 0;
+  float probability = 1.0f;
+  double rest = nodes_[0].count > 0 ? static_cast<double>(u) : refine(u, query.p);
+  while (nodes_[at].count == 0) {
+    const float left = importanceOf(nodes_[at + 1].bounds, query);
+    const float right = importanceOf(nodes_[nodes_[at].right].bounds, query);
+    if (!(left + right > 0.0f)) return {};
+    const float share = left / (left + right);
+    const auto border = static_cast<double>(share);
+    // (Rounding may bring the rest to 1.)
+    if (rest < border || !(right > 0.0f)) {
+      rest /= border;
+      probability *= share;
+      at = at + 1;
+    } else {
+      rest = (rest - border) / (1.0 - border);
+      probability *= 1.0f - share;
+      at = nodes_[at].right;
+    }
+  }
+  std::array<float, kLeaf> each{};
+  const Node& leaf = nodes_[at];
+  const float total = leafImportances(leaf, importance, each);
+  if (!(total > 0.0f)) return {};
+  const float target = static_cast<float>(rest) * total;
+  float before = 0.0f;
+  std::uint32_t chosen = 0;
+  for (std::uint32_t i = 0; i < leaf.count; ++i) {
+    if (!(each[i] > 0.0f)) continue;
+    chosen = i;
+    before += each[i];
+    if (target < before) break;
+  }
+  return {order_[leaf.first + chosen], probability * (each[chosen] / total)};
+}
+
+template <class Importance>
+float LightTree::probability(const LightQuery& query, std::uint32_t light, Importance importance) const {
+  if (light >= leafOf_.size() || leafOf_[light] == kNone) return 0.0f;
+  std::uint32_t at = leafOf_[light];
+  std::array<float, kLeaf> each{};
+  const float total = leafImportances(nodes_[at], importance, each);
+  if (!(total > 0.0f)) return 0.0f;
+  float probability = 0.0f;
+  for (std::uint32_t i = 0; i < nodes_[at].count; ++i)
+    if (order_[nodes_[at].first + i] == light) probability = each[i] / total;
+  for (; nodes_[at].parent != kNone; at = nodes_[at].parent) {
+    const std::uint32_t parent = nodes_[at].parent;
+    const float left = importanceOf(nodes_[parent + 1].bounds, query);
+    const float right = importanceOf(nodes_[nodes_[parent].right].bounds, query);
+    if (!(left + right > 0.0f)) return 0.0f;
+    const float share = left / (left + right);
+    probability *= at == parent + 1 ? share : 1.0f - share;
+  }
+  return probability;
+}
+
+}  // namespace lumel

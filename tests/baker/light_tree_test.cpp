@@ -1,0 +1,287 @@
+// The choice among many lights: its densities add up to one, are those of the samples, and leave no light out.
+#include "baker/light_tree.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "baker/lights.h"
+#include "tests/baker/test_scene.h"
+
+namespace lumel {
+namespace {
+
+using namespace testing_scene;
+
+class Random {
+ public:
+  explicit Random(unsigned seed) : engine_(seed) {}
+  float unit() { return static_cast<float>(engine_() >> 8) * 0x1p-24f; }
+  float in(float least, float most) { return least + (most - least) * unit(); }
+  Vec3 inBox(float half) { return {in(-half, half), in(-half, half), in(-half, half)}; }
+  Vec3 direction() {
+    for (;;)
+      if (const Vec3 v = inBox(1.0f); glm::dot(v, v) > 1e-3f && glm::dot(v, v) < 1.0f) return glm::normalize(v);
+  }
+
+ private:
+  std::mt19937 engine_;
+};
+
+LightBounds pointAt(const Vec3& p, float power = 1.0f) {
+  return {.min = p, .max = p, .cosSpread = -1.0f, .power = power};
+}
+
+/// Points, flat patches and spots of many sizes and powers.
+std::vector<LightBounds> mixture(std::size_t count, Random& random) {
+  std::vector<LightBounds> lights;
+  for (std::size_t i = 0; i < count; ++i) {
+    LightBounds light = pointAt(random.inBox(5.0f), std::exp(random.in(-4, 4)));
+    light.axis = random.direction();
+    if (i % 3 == 1) {
+      light.max += Vec3(random.unit(), random.unit(), random.unit());
+      light.cosSpread = 1.0f;
+    } else if (i % 3 == 2) {
+      light.cosSpread = random.in(-0.5f, 1.0f);
+      light.cosEmit = 0.9998f;
+    }
+    if (i % 7 == 0) light.reach = random.in(1, 10);
+    lights.push_back(light);
+  }
+  return lights;
+}
+
+TEST(LightTree, ProbabilitiesAddUpToOneAndMatchFrequencies) {
+  Random random(1);
+  const std::vector<LightBounds> lights = mixture(300, random);
+  const LightTree tree(lights);
+  const auto even = [](std::uint32_t) { return 1.0f; };
+  for (int trial = 0; trial < 6; ++trial) {
+    const LightQuery query{random.inBox(6.0f), trial % 2 ? random.direction() : Vec3(0.0f)};
+    double sum = 0;
+    std::vector<double> expected(lights.size());
+    for (std::uint32_t i = 0; i < lights.size(); ++i) {
+      expected[i] = static_cast<double>(tree.probability(query, i, even));
+      sum += expected[i];
+    }
+    // Groups may turn out to bring nothing when their halves are looked at.
+    EXPECT_LE(sum, 1.0 + 1e-5);
+    EXPECT_GT(sum, 0.8);
+    constexpr int kSamples = 100000;
+    std::vector<int> counts(lights.size());
+    int none = 0;
+    for (int i = 0; i < kSamples; ++i) {
+      const LightTree::Choice choice = tree.choose(query, random.unit(), even);
+      if (!(choice.probability > 0.0f)) {
+        ++none;
+        continue;
+      }
+      ++counts[choice.light];
+      ASSERT_NEAR(static_cast<double>(choice.probability) / expected[choice.light], 1.0, 1e-5);
+    }
+    EXPECT_NEAR(none, kSamples * (1 - sum), 5 * std::sqrt(kSamples * std::abs(1 - sum)) + 5);
+    // Chi-square; lights that are expected fewer than 5 times are one class.
+    double statistic = 0, rareExpected = 0;
+    int classes = 0, rare = 0;
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+      const double mean = expected[i] * kSamples;
+      if (mean < 5) {
+        rareExpected += mean;
+        rare += counts[i];
+        continue;
+      }
+      statistic += (counts[i] - mean) * (counts[i] - mean) / mean;
+      ++classes;
+    }
+    EXPECT_LT(std::abs(rare - rareExpected), 5 * std::sqrt(rareExpected) + 5);
+    // Five standard deviations of the statistic.
+    EXPECT_LT(statistic, classes + 5 * std::sqrt(2.0 * classes)) << classes << " classes";
+  }
+}
+
+TEST(LightTree, Degenerate) {
+  const auto even = [](std::uint32_t) { return 1.0f; };
+  const LightQuery query{{0, 0, 0}, {0, 1, 0}};
+  EXPECT_TRUE(LightTree().empty());
+  EXPECT_EQ(LightTree().choose(query, 0.5f, even).probability, 0.0f);
+  EXPECT_EQ(LightTree().importance(query), 0.0f);
+
+  const std::vector<LightBounds> one = {pointAt({0, 1, 0})};
+  EXPECT_EQ(LightTree(one).choose(query, 0.999f, even).probability, 1.0f);
+  EXPECT_EQ(LightTree(one).probability(query, 0, even), 1.0f);
+  EXPECT_EQ(LightTree(one).probability(query, 1, even), 0.0f);
+
+  // Without power, or with one that is no number: never chosen, and no harm to others.
+  std::vector<LightBounds> odd = {pointAt({0, 1, 0}, 0.0f), pointAt({0, 1, 0}, -1.0f),
+                                  pointAt({0, 1, 0}, std::nanf("")), pointAt({0, 1, 0}, INFINITY),
+                                  pointAt({0, 1, 0}, 2.0f)};
+  EXPECT_EQ(LightTree(odd).choose(query, 0.0f, even).light, 4u);
+  EXPECT_EQ(LightTree(odd).probability(query, 0, even), 0.0f);
+  odd.pop_back();
+  EXPECT_TRUE(LightTree(odd).empty());
+
+  // All in one place: halved by number, and each as likely as any other.
+  const LightTree pile(std::vector<LightBounds>(10000, pointAt({0, 1, 0})));
+  double sum = 0;
+  for (std::uint32_t i = 0; i < 10000; ++i) sum += static_cast<double>(pile.probability(query, i, even));
+  EXPECT_NEAR(sum, 1.0, 1e-4);
+  EXPECT_NEAR(static_cast<double>(pile.probability(query, 5000, even)), 1e-4, 2e-6);
+
+  // Light below the surface, and light at the very point.
+  const std::vector<LightBounds> below(100, pointAt({0, -1, 0}));
+  EXPECT_EQ(LightTree(below).choose(query, 0.5f, even).probability, 0.0f);
+  const std::vector<LightBounds> here(100, pointAt({0, 0, 0}));
+  EXPECT_EQ(LightTree(here).choose(query, 0.5f, even).probability, 0.0f);
+
+  // Ever closer together: as deep as trees get.
+  std::vector<LightBounds> row;
+  for (int i = 0; i < 2000; ++i) row.push_back(pointAt({std::ldexp(1.0f, -(i % 140)), 1, 0}));
+  const LightTree deep(row);
+  sum = 0;
+  for (std::uint32_t i = 0; i < row.size(); ++i) sum += static_cast<double>(deep.probability(query, i, even));
+  EXPECT_NEAR(sum, 1.0, 1e-4);
+}
+
+Light randomLight(Random& random, int kind) {
+  Light light;
+  light.position = random.inBox(5.0f);
+  light.intensity = std::exp(random.in(-3, 3));
+  light.direction = random.direction();
+  if (kind == 1) {
+    light.type = LightType::Spot;
+    light.outerConeAngle = random.in(0.05f, 1.5f);
+    light.innerConeAngle = random.in(0.0f, 0.9f) * light.outerConeAngle;
+  }
+  if (kind == 2) light.range = random.in(1.0f, 8.0f);
+  if (kind == 3) light.type = LightType::Directional;
+  return light;
+}
+
+// The mean over u of what samples bring is the sum over all lights: none is left out, and the densities are exact. The
+// midpoints of a fine grid stand for all u.
+TEST(PunctualLights, ManyLightsAgreeWithTheSum) {
+  Random random(7);
+  for (const int count : {1, 5, 32, 33, 100, 2000}) {
+    std::vector<Light> lights;
+    for (int i = 0; i < count; ++i) lights.push_back(randomLight(random, i % 40 == 3 ? 3 : i % 3));
+    const PunctualLights all(lights);
+    ASSERT_EQ(all.size(), lights.size());
+    for (int trial = 0; trial < 3; ++trial) {
+      const Vec3 p = random.inBox(6.0f);
+      const Vec3 n = random.direction();
+      double truth = 0, near = 0;
+      for (const Light& light : lights) {
+        Vec3 wi(0.0f);
+        const Vec3 facing = facingIrradiance(light, p, wi);
+        const auto brought = static_cast<double>(facing.x * std::max(0.0f, glm::dot(wi, n)));
+        truth += brought;
+        if (light.type != LightType::Directional) near += brought;
+      }
+      constexpr int kGrid = 1 << 18;
+      double sum = 0, sumNear = 0;
+      for (int i = 0; i < kGrid; ++i) {
+        const float u = (static_cast<float>(i) + 0.5f) / kGrid;
+        const LightSample s = all.sample(p, n, u);
+        sum += static_cast<double>(s.weight.x * std::max(0.0f, glm::dot(s.wi, n))) / kGrid;
+        const LightSample t = all.sampleNear(p, n, u);
+        sumNear += static_cast<double>(t.weight.x * std::max(0.0f, glm::dot(t.wi, n))) / kGrid;
+      }
+      // A light's share of u is met to one step of the grid; weights are a few times the mean.
+      EXPECT_NEAR(sum, truth, 2e-3 * truth + 1e-6) << count << " lights";
+      EXPECT_NEAR(sumNear, near, 2e-3 * near + 1e-6) << count << " lights";
+    }
+  }
+}
+
+TEST(PunctualLights, ManyDegenerate) {
+  Light light;
+  light.position = {0, 1, 0};
+  const Vec3 up(0, 1, 0);
+  const PunctualLights pile(std::vector<Light>(1000, light));
+  EXPECT_NEAR(pile.sample({0, 0, 0}, up, 0.3f).weight.x, 1000.0f, 0.1f);
+  // At the very place of all lights, and with all of them behind: nothing, and no NaN.
+  EXPECT_EQ(pile.sample({0, 1, 0}, up, 0.3f).weight, Vec3(0.0f));
+  EXPECT_EQ(pile.sample({0, 2, 0}, up, 0.3f).weight, Vec3(0.0f));
+  std::vector<Light> suns(100, light);
+  for (Light& sun : suns) {
+    sun.type = LightType::Directional;
+    sun.direction = {0, -1, 0};
+  }
+  EXPECT_NEAR(PunctualLights(suns).sample({0, 0, 0}, up, 0.7f).weight.x, 100.0f, 0.01f);
+  EXPECT_EQ(PunctualLights(suns).sampleNear({0, 0, 0}, up, 0.7f).weight, Vec3(0.0f));
+}
+
+/// Many lamps in view of each other, none in the way of another as seen from the floor.
+struct Lamps {
+  TestScene test;
+  std::vector<std::string> notes;
+  std::unique_ptr<Materials> materials;
+  std::unique_ptr<RayScene> rays;
+  EmissiveTriangles lights;
+
+  explicit Lamps(int side, float width) {
+    const int bright = test.addMaterial(Vec3(0.5f), Vec3(4.0f));
+    const int dim = test.addMaterial(Vec3(0.5f), Vec3(1.0f));
+    for (int i = 0; i < side; ++i)
+      for (int j = 0; j < side; ++j)
+        test.addRectangle({static_cast<float>(i) - 0.5f * width, 1.0f, static_cast<float>(j) - 0.5f * width},
+                          {width, 0, 0}, {0, 0, width}, {.material = (i + j) % 5 ? dim : bright, .texels = 0});
+    materials = std::make_unique<Materials>(test.scene, true, notes);
+    rays = std::move(*RayScene::build(test.scene, *materials));
+    lights = EmissiveTriangles(*rays, *materials);
+  }
+};
+
+TEST(EmissiveTriangles, ManyAgreeWithClosedForms) {
+  for (const auto& [side, width] : {std::pair{1, 3.0f}, std::pair{3, 0.9f}, std::pair{20, 0.3f}}) {
+    const Lamps lamps(side, width);
+    ASSERT_EQ(lamps.lights.size(), static_cast<std::size_t>(2 * side * side));
+    for (const Vec3& p : {Vec3(0.1f, 0, 0.2f), Vec3(0.7f, 0.95f, 1.1f), Vec3(-4, 0.5f, 1)}) {
+      double truth = 0;
+      for (int i = 0; i < side; ++i)
+        for (int j = 0; j < side; ++j) {
+          const double x = i, z = j, h = 0.5 * static_cast<double>(width);
+          truth += ((i + j) % 5 ? 1.0 : 4.0) *
+                   polygonLight(Vec3d(p), {0, 1, 0}, {0, 1, 0},
+                                {{x - h, 1, z - h}, {x + h, 1, z - h}, {x + h, 1, z + h}, {x - h, 1, z + h}});
+        }
+      constexpr std::uint32_t kSamples = 1 << 17;
+      double sum = 0;
+      for (std::uint32_t i = 0; i < kSamples; ++i) {
+        const LightSample s = lamps.lights.sample(p, sobol1D(i, 1), sobol2D(i, 2));
+        sum += static_cast<double>(s.weight.x * std::max(0.0f, s.wi.y)) / std::numbers::pi / kSamples;
+      }
+      EXPECT_NEAR(sum / truth, 1.0, 5e-3) << side << " lamps on a side";  // noise: 2e-3 and less
+    }
+  }
+}
+
+// Over all directions: every hit's density once, 1 in all. Where a lamp is so near that it fills half of the view,
+// and where all are small.
+TEST(EmissiveTriangles, DensityIntegratesToOne) {
+  for (const auto& [side, width] : {std::pair{1, 3.0f}, std::pair{3, 0.9f}, std::pair{6, 0.3f}}) {
+    const Lamps lamps(side, width);
+    for (const Vec3& p : {Vec3(0.1f, 0, 0.2f), Vec3(0.7f, 0.8f, 1.1f)}) {
+      constexpr std::uint32_t kRays = 1 << 18;
+      double sum = 0;
+      for (std::uint32_t first = 0; first < kRays; first += kLanes) {
+        RayPacket packet;
+        for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
+          const Vec2 u = sobol2D(first + lane, 5);
+          const float r = std::sqrt(1.0f - u.x * u.x);
+          const float phi = 2 * kPi * u.y;
+          packet.set(static_cast<int>(lane), p, {r * std::cos(phi), u.x, r * std::sin(phi)});
+        }
+        lamps.rays->intersect(packet, TraceMode::Packet);
+        for (int lane = 0; lane < kLanes; ++lane)
+          if (packet.hit(lane)) sum += static_cast<double>(lamps.lights.pdf(lamps.rays->surfaceAt(packet, lane), p));
+      }
+      // Uniform over the upper hemisphere; noise of the small lamps' edges.
+      EXPECT_NEAR(sum * 2 * std::numbers::pi / kRays, 1.0, 0.01) << side << " lamps on a side";
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lumel
