@@ -24,7 +24,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::uint64_t kReferenceSeed = 0x9e3779b97f4a7c15ull;
 /// Where charts do not fit the page at any density, larger pages are tried up to this.
 constexpr int kMostPage = 4096;
-constexpr int kPilotSamples = 4;
+constexpr std::array<int, 2> kPilotSamples = {4, 16};
 constexpr int kLeastReference = 64;
 constexpr int kMostReference = 1 << 16;
 /// The reference's share of the time: its error should be well below that of the best candidate.
@@ -146,6 +146,10 @@ class Studying {
     float density = 1.0f;   // factor on the reference's
     double expected = 0.0;  // seconds
   };
+  struct Cost {
+    double fixed = 0.0;  // seconds
+    double perSample = 0.0;
+  };
   struct Baked {
     BakeResult result;
     double seconds = 0.0;
@@ -163,7 +167,8 @@ class Studying {
   void measureDenoised(std::vector<BakedPage>& pages, StudyPoint point);
   void compare(const std::vector<BakedPage>& pages, StudyPoint& point) const;
   double secondsFor(Integrator integrator, int samples) const {
-    return secondsPerSample_[static_cast<std::size_t>(integrator)] * samples;
+    const Cost& cost = costs_[static_cast<std::size_t>(integrator)];
+    return cost.fixed + cost.perSample * samples;
   }
   double secondsUsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
   BakeOptions optionsFor(const StudyPoint& point) const {
@@ -185,7 +190,7 @@ class Studying {
   Maps truth_;
   double flatNoise_ = 0.0;  // mean square of the reference's own error
   double rnmNoise_ = 0.0;
-  std::array<double, 2> secondsPerSample_{};
+  std::array<Cost, 2> costs_{};  // by integrator
   Study study_;
 };
 
@@ -200,14 +205,18 @@ Expected<Studying::Baked> Studying::bakeOnce(const Atlas& atlas, const std::vect
   return baked;
 }
 
-/// How long a sample of either integrator takes.
+/// How long bakes take: a line through two small ones of either integrator.
 Expected<void> Studying::pilot() {
-  Progress silent;
   for (const Integrator integrator : {Integrator::Gather, Integrator::Path}) {
-    BakeOptions options = optionsFor({.integrator = integrator, .samples = kPilotSamples});
-    auto baked = bakeOnce(atlas_, texels_, options, 0.0);
-    if (!baked) return baked.error();
-    secondsPerSample_[static_cast<std::size_t>(integrator)] = baked->seconds / kPilotSamples;
+    std::array<double, kPilotSamples.size()> seconds{};
+    for (std::size_t i = 0; i < kPilotSamples.size(); ++i) {
+      auto baked = bakeOnce(atlas_, texels_, optionsFor({.integrator = integrator, .samples = kPilotSamples[i]}), 0.0);
+      if (!baked) return baked.error();
+      seconds[i] = baked->seconds;
+    }
+    Cost& cost = costs_[static_cast<std::size_t>(integrator)];
+    cost.perSample = std::max(seconds[1] - seconds[0], 0.25 * seconds[1]) / (kPilotSamples[1] - kPilotSamples[0]);
+    cost.fixed = std::max(0.0, seconds[0] - cost.perSample * kPilotSamples[0]);
   }
   return {};
 }
@@ -249,6 +258,8 @@ Expected<void> Studying::makeReference() {
     for (std::size_t i = 0; i < a.size(); ++i) a[i] = 0.5f * (a[i] + b[i]);
   };
   average(truth_.flat, halves[1].flat);
+  for (std::size_t i = 0; i < truth_.standardError.size(); ++i)
+    truth_.standardError[i] = 0.5f * std::hypot(truth_.standardError[i], halves[1].standardError[i]);
   for (std::size_t k = 0; k < 3; ++k) average(truth_.rnm[k], halves[1].rnm[k]);
   reference.meanFlat = meanOf(truth_.flat);
   if (!(reference.meanFlat > 0.0))
@@ -266,17 +277,22 @@ std::vector<Studying::Candidate> Studying::candidates() const {
     const double expected = secondsFor(point.integrator, point.samples) * static_cast<double>(density * density);
     all.push_back({std::move(point), density, expected});
   };
-  for (int samples = kStudyLeastSamples; samples <= options_.mostSamples; samples *= 2)
-    add({.series = "gather", .projection = options_.projection, .samples = samples}, 1.0f);
-  const int mostPath = std::max(kStudyLeastSamples, study_.reference.samples / kReferenceLead);
-  for (int samples = kStudyLeastSamples; samples <= mostPath; samples *= 4)
-    add({.series = "path", .integrator = Integrator::Path, .projection = options_.projection, .samples = samples},
-        1.0f);
   const int usual = std::min(options_.mostSamples, samplesOf(Quality::Production));
+  const auto addGather = [&](int samples) {
+    add({.series = "gather", .projection = options_.projection, .samples = samples}, 1.0f);
+  };
+  // What says most for its time comes first: the budget may end.
+  int gather = kStudyLeastSamples;
+  for (; gather <= usual; gather *= 2) addGather(gather);
   for (const Projection projection : {Projection::Raw, Projection::Flat, Projection::Fit})
     add({.series = "projection", .projection = projection, .samples = usual}, 1.0f);
   for (const float density : kDensities)
     add({.series = "density", .projection = options_.projection, .samples = usual}, density);
+  const int mostPath = std::max(kStudyLeastSamples, study_.reference.samples / kReferenceLead);
+  for (int samples = kStudyLeastSamples; samples <= mostPath; samples *= 4)
+    add({.series = "path", .integrator = Integrator::Path, .projection = options_.projection, .samples = samples},
+        1.0f);
+  for (; gather <= options_.mostSamples; gather *= 2) addGather(gather);
   return all;
 }
 
@@ -306,7 +322,8 @@ void Studying::compare(const std::vector<BakedPage>& pages, StudyPoint& point) c
     claimed += error * error;
     if (!(expected > kLit * mean)) continue;
     ++lit;
-    within += std::abs(static_cast<double>(luminance(maps.flat[i])) - expected) <= 1.96 * error;
+    within += std::abs(static_cast<double>(luminance(maps.flat[i])) - expected) <=
+              1.96 * std::hypot(error, static_cast<double>(truth_.standardError[i]));
   }
   point.withinInterval = lit > 0 ? static_cast<double>(within) / static_cast<double>(lit) : 0.0;
   point.claimed = std::sqrt(claimed / static_cast<double>(std::max<std::size_t>(1, maps.flat.size()))) / mean;
@@ -440,6 +457,12 @@ Expected<Study> Studying::run() {
     if (auto done = measure(candidate); !done) return done.error();
   }
   progress_.end();
+  const auto rank = [](const StudyPoint& p) {
+    constexpr std::array<std::string_view, 5> kOrder = {"gather", "denoised", "path", "projection", "density"};
+    return std::find(kOrder.begin(), kOrder.end(), p.series) - kOrder.begin();
+  };
+  std::stable_sort(study_.points.begin(), study_.points.end(),
+                   [&](const StudyPoint& a, const StudyPoint& b) { return rank(a) < rank(b); });
   return std::move(study_);
 }
 

@@ -162,14 +162,13 @@ std::string studyMarkdown(const Study& study, const std::string& scene) {
   std::string md = "# Study of " + scene + "\n\n" + std::to_string(study.texels) + " texels";
   if (study.texelsPerMeter > 0.0f)
     md += ", " + format("%.4g", static_cast<double>(study.texelsPerMeter)) + " per metre";
-  md +=
-      ". Reference: path tracing, 2 x " + std::to_string(r.samples) +
-      " samples with seeds of their own. By the difference of its halves its own error is " + percent(r.flatError) +
-      " (flat) and " + percent(r.rnmError) +
-      " (RNM); this is taken off in quadrature below. RMSE and bias are relative to the mean over covered, valid "
-      "texels. \"Within interval\" is the share of lit texels whose true error is at most 1.96 of the standard errors "
-      "that the bake states; denoised bakes state those from before.\n\n" +
-      tableOfSamples(study) + tableOfProjections(study) + tableOfDensities(study);
+  md += ". Reference: path tracing, 2 x " + std::to_string(r.samples) +
+        " samples with seeds of their own. By the difference of its halves its own error is " + percent(r.flatError) +
+        " (flat) and " + percent(r.rnmError) +
+        " (RNM); this is taken off in quadrature below. RMSE and bias are relative to the mean over covered, valid "
+        "texels. \"Within interval\" is the share of lit texels that differ from the reference by at most 1.96 of the "
+        "standard errors that both state; denoised bakes state those from before.\n\n" +
+        tableOfSamples(study) + tableOfProjections(study) + tableOfDensities(study);
   if (!study.notes.empty()) md += "\n";
   for (const std::string& note : study.notes) md += "- " + note + "\n";
   return md;
