@@ -3,11 +3,13 @@
 #include <xmmintrin.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <limits>
 #include <span>
 
+#include "baker/doubling_error.h"
 #include "baker/gather_integrator.h"
 #include "baker/path_integrator.h"
 #include "scene/parallel.h"
@@ -64,7 +66,6 @@ BakedTexel bakedTexel(const TexelResult& texel) {
   BakedTexel baked{.value = texel.sums.mean(),
                    .coverage = texel.coverage,
                    .validity = texel.sums.validity(),
-                   .standardError = texel.sums.standardError(),
                    .samples = texel.sums.count(),
                    .probed = texel.probed && texel.sums.count() > 0};
   if (baked.probed)
@@ -164,6 +165,45 @@ Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const R
   return waveStats;
 }
 
+/// Long paths gain little from their sequence, and tails are heavy: no credit is taken.
+constexpr double kPathCredit = 0.0;
+/// Batches after which the mean of a path-traced texel is kept: each has twice the samples of the one before.
+constexpr std::array<int, 5> kMarks = {1, 2, 4, 8, TexelSums::kBatches};
+using WaveMeans = std::array<std::array<float, kLanes>, kMarks.size()>;
+
+/// The standard errors of path-traced texels, as if their samples had been taken by doubling.
+void storePathErrors(const std::vector<Wave>& waves, const std::vector<WaveMeans>& means, int samples,
+                     const std::vector<PageTexels>& texels, std::vector<BakedPage>& pages,
+                     std::vector<WaveStats>& stats) {
+  std::vector<std::uint32_t> counts;
+  std::vector<std::uint32_t> pageOf;
+  for (const Wave& wave : waves) {
+    counts.push_back(static_cast<std::uint32_t>(wave.count));
+    pageOf.push_back(wave.page);
+  }
+  DoublingError errors(counts, pageOf, kPathCredit);
+  const std::vector<std::uint8_t> live(waves.size(), 1);
+  for (std::size_t m = 0; m < kMarks.size(); ++m) {
+    const auto samplesAt = [samples](int mark) {
+      return static_cast<std::uint32_t>((std::int64_t{samples} * mark + TexelSums::kBatches - 1) / TexelSums::kBatches);
+    };
+    const std::uint32_t before = m == 0 ? 0 : samplesAt(kMarks[m - 1]);
+    const std::uint32_t now = samplesAt(kMarks[m]);
+    if (now == before) continue;
+    for (std::size_t w = 0; w < waves.size(); ++w)
+      errors.add(w, means[w][m == 0 ? 0 : m - 1], means[w][m], before, now - before);
+    errors.endPass(live);
+  }
+  for (std::size_t w = 0; w < waves.size(); ++w)
+    for (std::size_t i = 0; i < waves[w].count; ++i) {
+      const TexelCoord at = texels[waves[w].page].coords[waves[w].first + i];
+      float* aux = pages[waves[w].page].aux.at(at.x, at.y);
+      if (!(aux[0] > 0.0f)) continue;
+      aux[2] = errors.standardError(w, i);
+      if (aux[1] >= 0.5f) stats[w].standardError += static_cast<double>(aux[2]);
+    }
+}
+
 Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, const RnmKernels& kernels,
                                             const Atlas& atlas, const std::vector<PageTexels>& texels,
                                             const BakeOptions& options, std::vector<BakedPage>& pages,
@@ -176,6 +216,7 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
   std::vector<WaveStats> waveStats(waves.size());
   std::uint64_t texelCount = 0;
   for (const PageTexels& page : texels) texelCount += page.size();
+  std::vector<WaveMeans> means(waves.size());
   progress.begin("bake", texelCount);
   parallelFor(waves.size(), 1, [&](std::size_t first, std::size_t last) {
     const FlushDenormals flush;
@@ -190,6 +231,8 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
       stats.nonFinite = done.nonFinite.size();
       done.nonFinite.resize(std::min(done.nonFinite.size(), kMostNotes));
       stats.firstNonFinite = std::move(done.nonFinite);
+      for (std::size_t m = 0; m < kMarks.size(); ++m)
+        for (std::size_t i = 0; i < wave.count; ++i) means[w][m][i] = done.texels[i].sums.luminanceBefore(kMarks[m]);
       for (std::size_t i = 0; i < wave.count; ++i)
         storeTexel(pages[wave.page], page.coords[wave.first + i], bakedTexel(done.texels[i]), options.projection,
                    stats);
@@ -198,6 +241,7 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
   });
   progress.end();
   if (progress.cancelled()) return interrupted();
+  storePathErrors(waves, means, std::max(1, options.samples), texels, pages, waveStats);
   return waveStats;
 }
 

@@ -1,6 +1,5 @@
 // lumel bake: from a scene file to the files of a bake.
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <memory>
 
@@ -10,11 +9,12 @@
 #include "baker/conventions.h"
 #include "baker/earlier_layout.h"
 #include "baker/finish.h"
+#include "baker/quality.h"
+#include "baker/scene_arguments.h"
 #include "baker/stage_clock.h"
+#include "baker/staging.h"
 #include "lightmap/atlas.h"
 #include "lightmap/texels.h"
-#include "scene/environment.h"
-#include "scene/load_scene.h"
 #include "scene/parallel.h"
 
 namespace lumel {
@@ -24,16 +24,12 @@ namespace fs = std::filesystem;
 
 constexpr int kDilateByPadding = -1;
 
-/// Samples per texel of the gather. In a Cornell box the flat map's RMS error is about 11%, 4.3% and 1.9% of its mean.
-enum class Quality { Draft, Preview, Production };
-constexpr std::array<int, 3> kQualitySamples = {16, 64, 256};
 /// Auto: where --quality asks for less than production.
 enum class Denoise { Auto, On, Off };
 /// Least samples where a target error is given and --samples is not: the first at which an error is known well enough.
 constexpr int kLeastSamples = 32;
 
-struct BakeArguments {
-  fs::path scene;
+struct BakeArguments : SceneArguments {
   fs::path output;
   AtlasOptions atlas;
   fs::path layoutFrom;
@@ -42,33 +38,9 @@ struct BakeArguments {
   int dilate = kDilateByPadding;
   bool half = false;
   int threads = 0;
-  Vec3 skyColor{0, 0, 0};
-  fs::path sky;
-  float skyRotation = 0.0f;
-  float skyStrength = 1.0f;
-  bool allowOutsidePaths = false;
   Quality quality = Quality::Production;
   int samples = 0;  // 0: as the quality has it
 };
-
-void declareAtlasOptions(OptionTable& options, BakeArguments& a) {
-  AtlasOptions& atlas = a.atlas;
-  options.group("Atlas");
-  options.choice("uv", atlas.uvSource, {"auto", "scene", "generate"},
-                 "Lightmap UVs: TEXCOORD_1 where it is valid, else generated (auto); TEXCOORD_1 or an error (scene); "
-                 "always generated (generate)");
-  options.number("texels-per-meter", atlas.texelsPerMeter, {0.0f, 1e6f},
-                 "Texel density; 0: the density that fills one page");
-  options.integer("page-size", atlas.pageSize, {4, 16384}, "Texels on a side of a page, a multiple of 4");
-  options.integer("padding", atlas.padding, {0, 256}, "Texels kept free between charts, at least");
-  options.number("max-stretch", atlas.maxStretch, {1.0f, 1000.0f},
-                 "A chart whose texels are stretched more than this is split");
-  options.integer("block-align", atlas.blockAlign, {0, 64},
-                  "Let no block of so many texels hold two charts, 4 for block compression; 0: off");
-  options.path("layout-from", a.layoutFrom,
-               "Folder of an earlier bake, may be the output's: unchanged charts stay where they are in it [none]")
-      .placeholder = "DIR";
-}
 
 void declareLightOptions(OptionTable& options, BakeArguments& a) {
   options.group("Light");
@@ -88,13 +60,7 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
                  "depends on the machine");
   options.integerOrWord("bounces", a.bake.bounces, {0, 1024}, "all", kAllBounces,
                         "Indirect bounces; 0: direct light only, all: as many as matter");
-  options.color("sky-color", a.skyColor, {0.0f}, "Radiance of an even sky in nits, red green blue [none]");
-  options.path("sky", a.sky, "Sky image: equirectangular .hdr or .exr [none]");
-  options
-      .number("sky-rotation", a.skyRotation, {},
-              "Degrees by which the sky image is turned, counter-clockwise from above")
-      .placeholder = "DEGREES";
-  options.number("sky-strength", a.skyStrength, {0.0f}, "Factor on the sky image or colour");
+  declareSkyOptions(options, a);
   options.choice("projection", a.bake.projection, {"raw", "flat", "fit"},
                  "How light is spread over the three maps: as in the literature (raw), scaled so that a flat normal is "
                  "exact (flat), least squares (fit)");
@@ -102,7 +68,7 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
 }
 
 void declareOptions(OptionTable& options, BakeArguments& a) {
-  options.positionalPath("scene", a.scene, "Scene: .gltf, .glb or .obj").placeholder = "SCENE";
+  declareScene(options, a);
   options.group("Files");
   Option& output =
       options.path("output", a.output, "Folder for the result; an older result is replaced when the new one is whole");
@@ -115,8 +81,12 @@ void declareOptions(OptionTable& options, BakeArguments& a) {
                  "and preview");
   options.integer("dilate", a.dilate, {0, 1024}, "Rings of texels grown around charts; 0: none").defaultText =
       "half of --padding";
-  options.flag("allow-outside-paths", a.allowOutsidePaths, "Let the scene name files outside its own folder");
-  declareAtlasOptions(options, a);
+  declareOutsidePaths(options, a);
+  declareAtlasOptions(options, a.atlas);
+  options
+      .path("layout-from", a.layoutFrom,
+            "Folder of an earlier bake, may be the output's: unchanged charts stay where they are in it [none]")
+      .placeholder = "DIR";
   declareLightOptions(options, a);
   options.group("General");
   options.integer("threads", a.threads, {0, 1024}, "Threads to use, without influence on the result; 0: one per core");
@@ -124,45 +94,13 @@ void declareOptions(OptionTable& options, BakeArguments& a) {
 
 /// What the options cannot check one by one.
 Expected<void> check(const BakeArguments& a) {
-  if (a.atlas.pageSize % 4 != 0)
-    return usageError("--page-size: " + std::to_string(a.atlas.pageSize) + " is not a multiple of 4");
+  if (auto checked = checkAtlas(a.atlas); !checked) return checked;
   if (a.bake.integrator == Integrator::Path && (a.bake.targetError > 0.0f || a.bake.timeBudgetSeconds > 0.0f))
     return usageError("--target-error and --time-budget work with --integrator gather alone; give --samples");
   if (a.bake.targetError > 0.0f && a.samples > a.bake.maxSamples)
     return usageError("--samples " + std::to_string(a.samples) + " is more than --max-samples " +
                       std::to_string(a.bake.maxSamples));
-  if (!a.sky.empty() && a.skyColor != Vec3(0.0f))
-    return usageError("--sky and --sky-color: give one of them; --sky-strength scales either");
-  return {};
-}
-
-Expected<Scene> loadLitScene(const BakeArguments& a) {
-  auto scene = loadScene(a.scene, {.allowOutsidePaths = a.allowOutsidePaths});
-  if (!scene) return scene;
-  if (!a.sky.empty()) {
-    auto sky = loadEnvironment(a.sky);
-    if (!sky) return sky.error();
-    scene->environment = std::move(*sky);
-  } else {
-    scene->environment.color = a.skyColor;
-  }
-  scene->environment.rotationDegrees = a.skyRotation;
-  scene->environment.strength = a.skyStrength;
-  return scene;
-}
-
-bool hasLight(const Scene& scene) {
-  const auto emits = [](const Material& m) { return m.emission != Vec3(0.0f); };
-  return !scene.environment.isBlack() || !scene.lights.empty() ||
-         std::any_of(scene.materials.begin(), scene.materials.end(), emits);
-}
-
-void printWarnings(const std::vector<std::string>& warnings) {
-  constexpr std::size_t kShown = 12;
-  for (std::size_t i = 0; i < std::min(warnings.size(), kShown); ++i)
-    std::fprintf(stderr, "lumel: warning: %s\n", warnings[i].c_str());
-  if (warnings.size() > kShown)
-    std::fprintf(stderr, "lumel: %zu more warnings; all are in bake.json\n", warnings.size() - kShown);
+  return checkSky(a);
 }
 
 void printSettings(const nlohmann::ordered_json& settings) {
@@ -199,8 +137,7 @@ void printSummary(const fs::path& output, const AtlasResult& atlas, const BakeRe
 
 int samplesOf(const BakeArguments& a) {
   if (a.samples > 0) return a.samples;
-  return a.bake.targetError > 0.0f ? std::min(kLeastSamples, a.bake.maxSamples)
-                                   : kQualitySamples[static_cast<std::size_t>(a.quality)];
+  return a.bake.targetError > 0.0f ? std::min(kLeastSamples, a.bake.maxSamples) : samplesOf(a.quality);
 }
 
 bool denoises(const BakeArguments& a) {

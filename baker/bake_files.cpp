@@ -1,17 +1,9 @@
 #include "baker/bake_files.h"
 
-#include <fcntl.h>
-#include <signal.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <charconv>
-#include <cstring>
-#include <fstream>
-
 #include "baker/bake_json.h"
 #include "baker/conventions.h"
 #include "baker/glb_writer.h"
+#include "baker/staging.h"
 #include "baker/version.h"
 #include "scene/image_io.h"
 
@@ -20,13 +12,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kStagingPrefix = ".lumel-";
-constexpr const char* kStagingSuffix = ".part";
-
-Error cannotWrite(const fs::path& file, const std::string& why) {
-  return failure(file.string() + ": cannot be written: " + why);
-}
-
 bool isPageImage(const std::string& name) {
   constexpr std::string_view prefix = "lightmap-";
   if (name.rfind(prefix, 0) != 0) return false;
@@ -34,105 +19,6 @@ bool isPageImage(const std::string& name) {
   if (dash == std::string::npos || dash == prefix.size()) return false;
   const std::string rest = name.substr(dash);
   return rest == "-rnm0.exr" || rest == "-rnm1.exr" || rest == "-rnm2.exr" || rest == "-flat.exr" || rest == "-aux.exr";
-}
-
-/// The folder in which a result is made whole. Removed with all it holds unless committed.
-class Staging {
- public:
-  static Expected<Staging> make(const fs::path& dir) {
-    std::error_code ec;
-    fs::create_directories(dir, ec);
-    if (ec) return cannotWrite(dir, ec.message());
-    removeAbandoned(dir);
-    Staging staging;
-    staging.dir_ = dir;
-    staging.path_ = dir / (kStagingPrefix + std::to_string(getpid()) + kStagingSuffix);
-    fs::create_directory(staging.path_, ec);
-    if (ec) return cannotWrite(staging.path_, ec.message());
-    return staging;
-  }
-
-  Staging(Staging&& other) noexcept { swap(other); }
-  Staging& operator=(Staging&& other) noexcept {
-    swap(other);
-    return *this;
-  }
-  ~Staging() {
-    std::error_code ec;
-    if (!path_.empty()) fs::remove_all(path_, ec);
-  }
-
-  /// Where to write a file of the result.
-  fs::path file(const std::string& name) {
-    names_.push_back(name);
-    return path_ / name;
-  }
-
-  /// Moves every file to its place in the order they were named, then drops page images of an older bake.
-  Expected<void> commit() {
-    for (const std::string& name : names_)
-      if (auto flushed = flush(path_ / name); !flushed) return flushed;
-    std::error_code ec;
-    for (const std::string& name : names_) {
-      fs::rename(path_ / name, dir_ / name, ec);
-      if (ec) return cannotWrite(dir_ / name, ec.message());
-    }
-    for (const fs::directory_entry& entry : fs::directory_iterator(dir_, ec)) {
-      const std::string name = entry.path().filename().string();
-      const bool ours = isPageImage(name) || name == "sky.exr";
-      std::error_code ignored;
-      if (ours && std::find(names_.begin(), names_.end(), name) == names_.end()) fs::remove(entry.path(), ignored);
-    }
-    return {};
-  }
-
- private:
-  Staging() = default;
-  void swap(Staging& other) {
-    std::swap(dir_, other.dir_);
-    std::swap(path_, other.path_);
-    std::swap(names_, other.names_);
-  }
-
-  static Expected<void> flush(const fs::path& file) {
-    const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
-    const bool flushed = descriptor >= 0 && fsync(descriptor) == 0;
-    const int error = errno;
-    if (descriptor >= 0) close(descriptor);
-    if (!flushed) return cannotWrite(file, std::strerror(error));
-    return {};
-  }
-
-  /// A bake that was killed leaves its staging folder; its process is gone.
-  static void removeAbandoned(const fs::path& dir) {
-    std::error_code ec;
-    for (const fs::directory_entry& entry : fs::directory_iterator(dir, ec)) {
-      const std::string name = entry.path().filename().string();
-      const std::size_t prefix = std::strlen(kStagingPrefix);
-      const std::size_t suffix = std::strlen(kStagingSuffix);
-      if (name.size() <= prefix + suffix || name.rfind(kStagingPrefix, 0) != 0 || !name.ends_with(kStagingSuffix))
-        continue;
-      pid_t pid = 0;
-      const char* end = name.data() + name.size() - suffix;
-      const auto parsed = std::from_chars(name.data() + prefix, end, pid);
-      if (parsed.ec != std::errc() || parsed.ptr != end || pid <= 0) continue;
-      const bool alive = pid != getpid() && (kill(pid, 0) == 0 || errno == EPERM);
-      std::error_code ignored;
-      if (!alive) fs::remove_all(entry.path(), ignored);
-    }
-  }
-
-  fs::path dir_;
-  fs::path path_;
-  std::vector<std::string> names_;
-};
-
-Expected<void> writeBytes(const fs::path& file, const void* data, std::size_t size) {
-  std::ofstream out(file, std::ios::binary | std::ios::trunc);
-  out.write(static_cast<const char*>(data), static_cast<std::streamsize>(size));
-  out.close();
-  if (!out) return cannotWrite(file, std::strerror(errno));
-  return {};
 }
 
 std::map<std::string, std::string> pageMetadata(std::size_t page, const std::string& kind, const BakeRecord& record) {
@@ -178,22 +64,6 @@ std::string pageFileName(std::size_t page, const std::string& kind) {
   return "lightmap-" + std::to_string(page) + "-" + kind + ".exr";
 }
 
-Expected<void> checkWritable(const fs::path& dir) {
-  fs::path made;  // the first folder on the way that is not there yet
-  std::error_code ec;
-  for (fs::path p = fs::absolute(dir, ec).lexically_normal(); !p.empty() && !fs::exists(p, ec) && p != p.parent_path();
-       p = p.parent_path())
-    made = p;
-  fs::create_directories(dir, ec);
-  if (ec || !fs::is_directory(dir)) return cannotWrite(dir, ec ? ec.message() : "not a folder");
-  const fs::path probe = dir / (kStagingPrefix + std::to_string(getpid()) + ".probe");
-  auto written = writeBytes(probe, "", 0);
-  fs::remove(probe, ec);
-  if (!made.empty()) fs::remove_all(made, ec);
-  if (!written) return cannotWrite(dir, "no file can be made in it");
-  return {};
-}
-
 Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasResult& atlas, const BakeResult& result,
                          const BakeRecord& record) {
   auto staging = Staging::make(dir);
@@ -207,7 +77,7 @@ Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasRes
   if (auto done = writeBytes(staging->file("scene.glb"), glb->data(), glb->size()); !done) return done;
   const std::string json = describeBake(scene, atlas, result, record);
   if (auto done = writeBytes(staging->file("bake.json"), json.data(), json.size()); !done) return done;
-  return staging->commit();
+  return staging->commit([](const std::string& name) { return isPageImage(name) || name == "sky.exr"; });
 }
 
 }  // namespace lumel

@@ -43,10 +43,6 @@ inline constexpr int kBakeFormat = 1;
 Expected<void> writeBake(const std::filesystem::path& dir, const Scene& scene, const AtlasResult& atlas,
                          const BakeResult& result, const BakeRecord& record);
 
-/// Finds out before the long work whether `dir` can be written: makes it and a file in it, and removes what it made.
-/// Errors: Failed, naming the folder.
-Expected<void> checkWritable(const std::filesystem::path& dir);
-
 /// File name of a page's image: kind is "rnm0", "rnm1", "rnm2", "flat" or "aux".
 std::string pageFileName(std::size_t page, const std::string& kind);
 

@@ -34,5 +34,6 @@ Command bakeCommand();
 Command renderCommand();
 Command infoCommand();
 Command diffCommand();
+Command studyCommand();
 
 }  // namespace lumel

@@ -101,7 +101,7 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
 
   std::vector<std::unique_ptr<Parsed>> commands;
   std::set<std::string> names;
-  for (auto make : {bakeCommand, ssbumpCommand, renderCommand, infoCommand, diffCommand}) {
+  for (auto make : {bakeCommand, ssbumpCommand, renderCommand, infoCommand, diffCommand, studyCommand}) {
     commands.push_back(std::make_unique<Parsed>());
     commands.back()->command = make();
     names.insert(commands.back()->command.name);

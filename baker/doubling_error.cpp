@@ -8,7 +8,9 @@
 
 namespace lumel {
 
-DoublingError::DoublingError(std::span<const std::uint32_t> runLengths, std::span<const std::uint32_t> groups) {
+DoublingError::DoublingError(std::span<const std::uint32_t> runLengths, std::span<const std::uint32_t> groups,
+                             double credit)
+    : credit_(credit) {
   LUMEL_CHECK(runLengths.size() == groups.size());
   std::size_t texels = 0;
   runs_.reserve(runLengths.size());
@@ -46,7 +48,7 @@ void DoublingError::endPass(const std::vector<std::uint8_t>& live) {
       now += runs_[r].moved;
     }
   if (before > 0.0 && now > 0.0) rate_ = std::clamp(std::log2(before / now), 1.0, 2.0);
-  const double credit = 1.0 / std::sqrt(std::exp2(rate_) - 1.0);
+  const double factor = std::pow(std::exp2(rate_) - 1.0, -credit_);
   for (std::size_t r = 0; r < runs_.size(); ++r) {
     Run& run = runs_[r];
     if (!live[r] || run.samplesBefore == 0) continue;
@@ -57,7 +59,7 @@ void DoublingError::endPass(const std::vector<std::uint8_t>& live) {
       sum += static_cast<double>(sums_[t]);
     }
     ++run.doublings;
-    run.credit = credit;
+    run.factor = factor;
     run.meanSquare = sum / (static_cast<double>(run.count) * run.doublings);
   }
   parallelFor(runs_.size(), 256, [&](std::size_t first, std::size_t last) {
@@ -88,7 +90,7 @@ float DoublingError::standardError(std::size_t index, std::size_t i) const {
   const Run& run = runs_[index];
   if (run.doublings == 0) return 0.0f;
   const double moved = (static_cast<double>(sums_[run.first + i]) + kPrior * run.pool) / (run.doublings + kPrior);
-  return static_cast<float>(std::sqrt(run.credit * moved));
+  return static_cast<float>(std::sqrt(run.factor * moved));
 }
 
 }  // namespace lumel

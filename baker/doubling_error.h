@@ -14,9 +14,9 @@ namespace lumel {
 /// independent E[d^2] would be the variance of the mean of all. Those of an Owen-scrambled sequence are better than
 /// that, their errors partly cancel: with a variance that falls as n^-rate E[d^2] = (2^rate - 1) times the variance
 /// (since V(n) + E[d^2] = V(n/2), and V(n/2) = 2^rate V(n)). The rate is measured, by how d^2 falls over all texels.
-/// Half of the credit is taken, on a scale of factors: the variance is d^2 / sqrt(2^rate - 1). The other half pays for
+/// `credit` of it is taken: the variance is d^2 / (2^rate - 1)^credit. The rest pays for
 /// what d^2 cannot see, the noise that both halves took from the same cache, and for tails heavier than a normal
-/// distribution's. That is a calibration; with it 93 to 97% of texels lie within 1.96 standard errors (README).
+/// distribution's. The credit is a calibration; with it 93 to 97% of texels lie within 1.96 standard errors (README).
 ///
 /// One d^2 is hardly an estimate, so others join: the texel's earlier doublings, scaled to the
 /// present by the rate; the texels of the kReach runs on either side, which count as much as kPrior doublings.
@@ -26,8 +26,9 @@ class DoublingError {
   static constexpr std::size_t kReach = 4;
   static constexpr double kPrior = 3.0;
 
-  /// `runLengths`: texels of each run; texels are numbered through. Runs of one `group` (a page) are neighbours.
-  DoublingError(std::span<const std::uint32_t> runLengths, std::span<const std::uint32_t> groups);
+  /// `runLengths`: texels of each run; texels are numbered through. Runs of one `group` (a page) are
+  /// neighbours. `credit`: 0 to 1.
+  DoublingError(std::span<const std::uint32_t> runLengths, std::span<const std::uint32_t> groups, double credit);
 
   /// The means of a run's texels were `before` from n0 samples and are `now` from n1 more as well. Runs may be called
   /// from several threads at once.
@@ -52,13 +53,14 @@ class DoublingError {
     double movedBefore = -1.0;
     double meanSquare = 0.0;  // mean d^2 over the texels and doublings
     double pool = 0.0;        // the same of the neighbourhood
-    double credit = 1.0;      // variance / mean d^2
+    double factor = 1.0;      // variance / mean d^2
   };
   double poolAround(std::size_t run) const;
 
   std::vector<Run> runs_;
   std::vector<float> squares_;  // of the last pass: d^2
   std::vector<float> sums_;     // of d^2 over all passes, each scaled to the samples of the last
+  double credit_;
   double rate_ = 1.0;
 };
 

@@ -7,6 +7,7 @@
 #include "baker/bake_files.h"
 #include "baker/command.h"
 #include "baker/compositor.h"
+#include "baker/staging.h"
 #include "baker/tone_map.h"
 #include "baker/version.h"
 #include "baker/viewpoint.h"

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -40,8 +41,15 @@ class StageClock {
   bool quiet_ = false;
 };
 
-/// Most memory that this process has had resident so far.
+/// Most memory that this process has had resident so far. (getrusage would count what its parent had when it forked.)
 inline std::size_t peakMemoryBytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;)
+    if (word == "VmHWM:") {
+      std::size_t kibibytes = 0;
+      status >> kibibytes;
+      return kibibytes * 1024;
+    }
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<std::size_t>(usage.ru_maxrss) * 1024;  // Linux counts kibibytes

@@ -1,7 +1,5 @@
 #include "baker/texel_sums.h"
 
-#include <cmath>
-
 namespace lumel {
 
 SampleValue TexelSums::mean() const {
@@ -18,23 +16,14 @@ float TexelSums::validity() const {
   return static_cast<float>(1.0 - static_cast<double>(backFaces_) / gatherRays_);
 }
 
-float TexelSums::standardError() const {
-  if (count_ < 2) return 0.0f;
+float TexelSums::luminanceBefore(int batch) const {
   double sum = 0.0;
-  for (const double s : batchSum_) sum += s;
-  const double mean = sum / count_;
-  // Batches may differ in size by one sample: each counts by its share of the samples.
-  double spread = 0.0;
-  int batches = 0;
-  for (std::size_t b = 0; b < kBatches; ++b) {
-    if (batchCount_[b] == 0) continue;
-    ++batches;
-    const double excess = batchSum_[b] - mean * batchCount_[b];
-    spread += excess * excess;
+  std::uint32_t count = 0;
+  for (std::size_t b = 0; b < static_cast<std::size_t>(batch); ++b) {
+    sum += batchSum_[b];
+    count += batchCount_[b];
   }
-  if (batches < 2) return 0.0f;
-  const double variance = spread / (static_cast<double>(count_) * count_) * batches / (batches - 1);
-  return static_cast<float>(std::sqrt(variance));
+  return count == 0 ? 0.0f : static_cast<float>(sum / count);
 }
 
 }  // namespace lumel

@@ -1,4 +1,4 @@
-// What a bake keeps per texel while it samples: sums in double, and batches for the standard error.
+// What a bake keeps per texel while it samples: sums in double, and how the mean went on its way.
 #pragma once
 
 #include <array>
@@ -37,9 +37,8 @@ class TexelSums {
   SampleValue mean() const;
   /// Share of gather rays that met no back face of a single-sided surface; 1 where none was traced.
   float validity() const;
-  /// Standard error of the mean's luminance, from the spread of the batches' means. The batches are stretches of one
-  /// Owen-scrambled sequence, whose errors partly cancel: the figure errs on the large side (README).
-  float standardError() const;
+  /// Luminance of the mean over the batches before `batch`; 0 where they have no samples.
+  float luminanceBefore(int batch) const;
 
  private:
   Vec3d flat_{0};

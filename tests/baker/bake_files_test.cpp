@@ -1,4 +1,5 @@
 #include "baker/bake_files.h"
+#include "baker/staging.h"
 
 #include <gtest/gtest.h>
 

@@ -71,7 +71,7 @@ std::vector<double> reference(TestScene test, Integrator integrator) {
   std::vector<double> mean;
   for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
     const Texels texels =
-        texelsOf(test.bake({.samples = integrator == Integrator::Path ? 4096 : 8192, .seed = 900 + seed}));
+        texelsOf(test.bake({.samples = integrator == Integrator::Path ? 2048 : 8192, .seed = 900 + seed}));
     mean.resize(texels.light.size());
     for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += texels.light[i] / kRuns;
   }
@@ -123,7 +123,7 @@ void expectCoverage(Integrator integrator, std::initializer_list<int> counts) {
 
 TEST(ErrorCoverage, Gather) { expectCoverage(Integrator::Gather, {32, 64, 256}); }
 
-TEST(ErrorCoverage, Path) { expectCoverage(Integrator::Path, {32, 128}); }
+TEST(ErrorCoverage, Path) { expectCoverage(Integrator::Path, {32, 64}); }
 
 // Sampling that stops where its estimate happens to be low takes fewer samples there; the light must not follow.
 TEST(ErrorCoverage, TargetErrorIsMetAndUnbiased) {

@@ -34,7 +34,7 @@ TEST(ExitCodes, HelpAndVersionSucceedOnStandardOutput) {
   const Outcome version = run({"--version"});
   EXPECT_EQ(version.exitCode, 0);
   EXPECT_EQ(version.out.rfind("lumel ", 0), 0u) << version.out;
-  for (const char* command : {"bake", "render", "info", "diff"}) {
+  for (const char* command : {"bake", "render", "info", "diff", "study"}) {
     const Outcome help = run({command, "--help"});
     EXPECT_EQ(help.exitCode, 0);
     EXPECT_NE(help.out.find("Usage: lumel " + std::string(command)), std::string::npos);

@@ -1,0 +1,55 @@
+// Results of several files, made whole in a hidden folder before any of them is seen.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "scene/expected.h"
+
+namespace lumel {
+
+/// The folder in which a result is made whole. Removed with all it holds unless committed.
+class Staging {
+ public:
+  /// Makes `dir` if needed, and in it the folder for the files. Errors: Failed.
+  static Expected<Staging> make(const std::filesystem::path& dir);
+  Staging(Staging&& other) noexcept { swap(other); }
+  Staging& operator=(Staging&& other) noexcept {
+    swap(other);
+    return *this;
+  }
+  ~Staging();
+
+  /// Where to write a file of the result.
+  std::filesystem::path file(const std::string& name) {
+    names_.push_back(name);
+    return path_ / name;
+  }
+
+  /// Moves every file to its place in the order they were named, then drops files of an older result: those that
+  /// `ours` knows and this result does not have. Errors: Failed.
+  Expected<void> commit(const std::function<bool(const std::string& name)>& ours);
+
+ private:
+  Staging() = default;
+  void swap(Staging& other) {
+    std::swap(dir_, other.dir_);
+    std::swap(path_, other.path_);
+    std::swap(names_, other.names_);
+  }
+
+  std::filesystem::path dir_;
+  std::filesystem::path path_;
+  std::vector<std::string> names_;
+};
+
+/// Errors: Failed.
+Expected<void> writeBytes(const std::filesystem::path& file, const void* data, std::size_t size);
+
+/// Finds out before the long work whether `dir` can be written: makes it and a file in it, and removes what it made.
+/// Errors: Failed, naming the folder.
+Expected<void> checkWritable(const std::filesystem::path& dir);
+
+}  // namespace lumel
