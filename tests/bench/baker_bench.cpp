@@ -66,7 +66,7 @@ struct Ready {
       : test(hall(side)),
         materials(test.scene, true, notes),
         rays(std::move(*RayScene::build(test.scene, materials))),
-        punctual(test.scene.lights, glm::length(rays->boundsMax() - rays->boundsMin())),
+        punctual(test.scene.lights),
         emissive(*rays, materials),
         environment(test.scene.environment) {}
   LightTransport transport() const { return {*rays, materials, punctual, emissive, environment}; }
