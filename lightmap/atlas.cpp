@@ -135,8 +135,11 @@ class AtlasBuilder {
       report.generatedCharts += unwrapped.charts.size();
     }
     takePlaces(objects, *places, keys);
-    if (earlier && report.keptCharts == 0 && !earlier->charts.empty())
-      report.warnings.push_back("the earlier layout holds no chart of this scene: all charts are placed anew");
+    const bool hadSome = std::any_of(kept.charts.begin(), kept.charts.end(), [](const auto& c) { return c.has_value(); });
+    if (earlier && report.keptCharts == 0 && report.generatedCharts > 0)
+      report.warnings.push_back(std::string("the earlier layout ") +
+                                (hadSome ? "has no room for what changed" : "holds no chart of this scene") +
+                                ": all charts are placed anew");
     return {};
   }
 
