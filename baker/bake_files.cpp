@@ -22,6 +22,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kStagingPrefix = ".lumel-";
 constexpr const char* kStagingSuffix = ".part";
+constexpr const char* kOld = "old";  // in the staging folder: the files that the new ones replace
+constexpr const char* kBakeJson = "bake.json";
 
 Error cannotWrite(const fs::path& file, const std::string& why) {
   return failure(file.string() + ": cannot be written: " + why);
@@ -43,7 +45,7 @@ class Staging {
     std::error_code ec;
     fs::create_directories(dir, ec);
     if (ec) return cannotWrite(dir, ec.message());
-    removeAbandoned(dir);
+    recover(dir);
     Staging staging;
     staging.dir_ = dir;
     staging.path_ = dir / (kStagingPrefix + std::to_string(getpid()) + kStagingSuffix);
@@ -68,22 +70,37 @@ class Staging {
     return path_ / name;
   }
 
-  /// Moves every file to its place in the order they were named, then drops page images of an older bake.
+  /// Puts the new files in the place of the old ones, which stay in the staging folder until that is done: if a step
+  /// fails, all is put back. bake.json goes first and comes last, so no reader takes a mixture for a bake.
   Expected<void> commit() {
     for (const std::string& name : names_)
       if (auto flushed = flush(path_ / name); !flushed) return flushed;
     std::error_code ec;
-    for (const std::string& name : names_) {
-      fs::rename(path_ / name, dir_ / name, ec);
-      if (ec) return cannotWrite(dir_ / name, ec.message());
-    }
-    for (const fs::directory_entry& entry : fs::directory_iterator(dir_, ec)) {
-      const std::string name = entry.path().filename().string();
-      const bool ours = isPageImage(name) || name == "sky.exr";
-      std::error_code ignored;
-      if (ours && std::find(names_.begin(), names_.end(), name) == names_.end()) fs::remove(entry.path(), ignored);
+    for (const std::string& name : names_)
+      if (fs::exists(dir_ / name, ec) && !fs::is_regular_file(dir_ / name, ec))
+        return cannotWrite(dir_ / name, "something that is not a file has that name");
+    fs::create_directory(path_ / kOld, ec);
+    if (ec) return cannotWrite(path_ / kOld, ec.message());
+    std::vector<std::string> arrived;
+    if (auto moved = exchange(arrived); !moved) {
+      for (const std::string& name : arrived) fs::remove(dir_ / name, ec);
+      putBack(dir_, path_);
+      return moved;
     }
     return {};
+  }
+
+  /// What bakes that were killed left behind: what they had not written is removed, and an old bake that one was about
+  /// to replace is put back.
+  static void recover(const fs::path& dir) {
+    std::error_code ec;
+    std::vector<fs::path> abandoned;
+    for (const fs::directory_entry& entry : fs::directory_iterator(dir, ec))
+      if (isAbandoned(entry.path().filename().string())) abandoned.push_back(entry.path());
+    for (const fs::path& staging : abandoned) {
+      if (!fs::exists(dir / kBakeJson, ec)) putBack(dir, staging);
+      fs::remove_all(staging, ec);
+    }
   }
 
  private:
@@ -103,23 +120,47 @@ class Staging {
     return {};
   }
 
-  /// A bake that was killed leaves its staging folder; its process is gone.
-  static void removeAbandoned(const fs::path& dir) {
+  /// bake.json first among the old files to leave, last among the new ones to arrive.
+  Expected<void> exchange(std::vector<std::string>& arrived) {
+    std::vector<std::string> old = {kBakeJson};
     std::error_code ec;
-    for (const fs::directory_entry& entry : fs::directory_iterator(dir, ec)) {
-      const std::string name = entry.path().filename().string();
-      const std::size_t prefix = std::strlen(kStagingPrefix);
-      const std::size_t suffix = std::strlen(kStagingSuffix);
-      if (name.size() <= prefix + suffix || name.rfind(kStagingPrefix, 0) != 0 || !name.ends_with(kStagingSuffix))
-        continue;
-      pid_t pid = 0;
-      const char* end = name.data() + name.size() - suffix;
-      const auto parsed = std::from_chars(name.data() + prefix, end, pid);
-      if (parsed.ec != std::errc() || parsed.ptr != end || pid <= 0) continue;
-      const bool alive = pid != getpid() && (kill(pid, 0) == 0 || errno == EPERM);
-      std::error_code ignored;
-      if (!alive) fs::remove_all(entry.path(), ignored);
+    for (const fs::directory_entry& entry : fs::directory_iterator(dir_, ec))
+      if (const std::string name = entry.path().filename().string(); isPageImage(name) || name == "sky.exr" || name == "scene.glb")
+        old.push_back(name);
+    for (const std::string& name : old)
+      if (fs::is_regular_file(dir_ / name, ec)) {
+        fs::rename(dir_ / name, path_ / kOld / name, ec);
+        if (ec) return cannotWrite(dir_ / name, ec.message());
+      }
+    for (const std::string& name : names_) {
+      fs::rename(path_ / name, dir_ / name, ec);
+      if (ec) return cannotWrite(dir_ / name, ec.message());
+      arrived.push_back(name);
     }
+    return {};
+  }
+
+  static void putBack(const fs::path& dir, const fs::path& staging) {
+    std::error_code ec;
+    for (const fs::directory_entry& entry : fs::directory_iterator(staging / kOld, ec))
+      if (const fs::path name = entry.path().filename(); name != kBakeJson) {
+        std::error_code ignored;
+        fs::rename(entry.path(), dir / name, ignored);
+      }
+    fs::rename(staging / kOld / kBakeJson, dir / kBakeJson, ec);
+  }
+
+  /// Whether this is the staging folder of a process that is gone.
+  static bool isAbandoned(const std::string& name) {
+    const std::size_t prefix = std::strlen(kStagingPrefix);
+    const std::size_t suffix = std::strlen(kStagingSuffix);
+    if (name.size() <= prefix + suffix || name.rfind(kStagingPrefix, 0) != 0 || !name.ends_with(kStagingSuffix))
+      return false;
+    pid_t pid = 0;
+    const char* end = name.data() + name.size() - suffix;
+    const auto parsed = std::from_chars(name.data() + prefix, end, pid);
+    if (parsed.ec != std::errc() || parsed.ptr != end || pid <= 0) return false;
+    return pid == getpid() || (kill(pid, 0) != 0 && errno != EPERM);
   }
 
   fs::path dir_;
@@ -178,6 +219,8 @@ std::string pageFileName(std::size_t page, const std::string& kind) {
   return "lightmap-" + std::to_string(page) + "-" + kind + ".exr";
 }
 
+void recoverBake(const fs::path& dir) { Staging::recover(dir); }
+
 Expected<void> checkWritable(const fs::path& dir) {
   fs::path made;  // the first folder on the way that is not there yet
   std::error_code ec;
@@ -206,7 +249,7 @@ Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasRes
   if (!glb) return glb.error();
   if (auto done = writeBytes(staging->file("scene.glb"), glb->data(), glb->size()); !done) return done;
   const std::string json = describeBake(scene, atlas, result, record);
-  if (auto done = writeBytes(staging->file("bake.json"), json.data(), json.size()); !done) return done;
+  if (auto done = writeBytes(staging->file(kBakeJson), json.data(), json.size()); !done) return done;
   return staging->commit();
 }
 

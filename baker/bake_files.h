@@ -37,11 +37,16 @@ inline constexpr int kBakeFormat = 1;
 
 /// Writes bake.json, scene.glb, every page's images and, where the scene has one, the sky (sky.exr) into `dir` (made if
 /// needed). Everything is written to a folder inside `dir` first; the old result stays whole until all of the new one
-/// is on disk, bake.json is renamed last. Pages of an older, larger bake are removed.
+/// is on disk. Then the old files move into that folder, bake.json first, and the new ones to their places, bake.json
+/// last; if a step fails, the old ones are put back. Nothing of an older, larger bake stays.
+/// Killed between these renames, `dir` has no bake.json, so nothing is taken for a bake, until recoverBake.
 /// Everything but bake.json's "run" (times, threads, memory) is the same for the same scene and settings.
 /// Errors: Failed.
 Expected<void> writeBake(const std::filesystem::path& dir, const Scene& scene, const AtlasResult& atlas,
                          const BakeResult& result, const BakeRecord& record);
+
+/// Removes what killed bakes left in `dir`, and puts an old bake back that one of them was about to replace.
+void recoverBake(const std::filesystem::path& dir);
 
 /// Finds out before the long work whether `dir` can be written: makes it and a file in it, and removes what it made.
 /// Errors: Failed, naming the folder.
