@@ -153,12 +153,13 @@ Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const R
   if (auto done = integrator.run(progress); !done) return done.error();
   pages = emptyPages(atlas);
   const std::vector<Wave> waves = wavesOf(texels);
-  std::vector<WaveStats> waveStats(waves.size() + 1);
-  parallelFor(waves.size(), 64, [&](std::size_t first, std::size_t last) {
+  constexpr std::size_t kGrain = 64;  // waves that share their figures: one entry per wave would cost 7 bytes a texel
+  std::vector<WaveStats> waveStats(waves.size() / kGrain + 2);
+  parallelFor(waves.size(), kGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t w = first; w < last; ++w)
       for (std::size_t i = waves[w].first; i < waves[w].first + waves[w].count; ++i)
         storeTexel(pages[waves[w].page], texels[waves[w].page].coords[i], integrator.texel(waves[w].page, i),
-                   options.projection, waveStats[w]);
+                   options.projection, waveStats[first / kGrain]);
   });
   waveStats.back().rays = integrator.rays();
   waveStats.back().shadowRays = integrator.shadowRays();

@@ -11,6 +11,7 @@ struct BakeSize {
   double coveredTexels = 0.0;
   double triangles = 0.0;     // of all instances
   double encodedBytes = 0.0;  // of images, as they are in their files
+  double decodedTexels = 0.0;  // of images that shade or emit
 };
 
 /// Triangles and images of a scene; texels are left at 0.

@@ -93,7 +93,7 @@ Json countUvSets(const Scene& scene) {
 Json estimate(const Totals& totals, const BakeSize& scene, const EstimateOptions& options) {
   // So much of a page is surface; generated charts stretch little, so area times density squared gives texels. Partly
   // covered ones at the borders of charts come on top.
-  constexpr double kPacking = 0.75;
+  constexpr double kPacking = 0.82;
   constexpr double kTouched = 1.07;
   constexpr double kBytesPerPageTexel = (3 * 3 + 3 + 4) * sizeof(float);  // what the five images hold
   const double page = static_cast<double>(options.pageSize) * static_cast<double>(options.pageSize);
