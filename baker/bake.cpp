@@ -131,10 +131,12 @@ BakeStats sumUp(std::span<const WaveStats> waves, std::uint64_t seed) {
 }
 
 std::vector<BakedPage> emptyPages(const Atlas& atlas) {
-  std::vector<BakedPage> pages;
-  for (const Page& page : atlas.pages) {
-    const Image rgb(page.width, page.height, 3);
-    pages.push_back({{rgb, rgb, rgb}, rgb, Image(page.width, page.height, 4)});
+  std::vector<BakedPage> pages(atlas.pages.size());
+  for (std::size_t i = 0; i < pages.size(); ++i) {
+    const Page& page = atlas.pages[i];
+    for (Image* image : {&pages[i].rnm[0], &pages[i].rnm[1], &pages[i].rnm[2], &pages[i].flat})
+      *image = Image(page.width, page.height, 3);
+    pages[i].aux = Image(page.width, page.height, 4);
   }
   return pages;
 }
@@ -150,13 +152,15 @@ Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const R
                                .targetError = options.targetError,
                                .timeBudgetSeconds = static_cast<double>(options.timeBudgetSeconds)});
   if (auto done = integrator.run(progress); !done) return done.error();
+  pages = emptyPages(atlas);
   const std::vector<Wave> waves = wavesOf(texels);
-  std::vector<WaveStats> waveStats(waves.size() + 1);
-  parallelFor(waves.size(), 64, [&](std::size_t first, std::size_t last) {
+  constexpr std::size_t kGrain = 64;  // waves that share their figures: one entry per wave would cost 7 bytes a texel
+  std::vector<WaveStats> waveStats(waves.size() / kGrain + 2);
+  parallelFor(waves.size(), kGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t w = first; w < last; ++w)
       for (std::size_t i = waves[w].first; i < waves[w].first + waves[w].count; ++i)
         storeTexel(pages[waves[w].page], texels[waves[w].page].coords[i], integrator.texel(waves[w].page, i),
-                   options.projection, waveStats[w]);
+                   options.projection, waveStats[first / kGrain]);
   });
   waveStats.back().rays = integrator.rays();
   waveStats.back().shadowRays = integrator.shadowRays();
@@ -212,6 +216,7 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
                                   {.samples = std::max(1, options.samples),
                                    .bounces = options.bounces < 0 ? kLongestPath : options.bounces,
                                    .seed = options.seed});
+  pages = emptyPages(atlas);
   const std::vector<Wave> waves = wavesOf(texels);
   std::vector<WaveStats> waveStats(waves.size());
   std::uint64_t texelCount = 0;
@@ -261,7 +266,6 @@ Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vec
   const RnmKernels kernels(options.projection);
 
   BakeResult result;
-  result.pages = emptyPages(atlas);
   const auto waveStats = options.integrator == Integrator::Gather
                              ? gather(transport, kernels, atlas, texels, options, result.pages, progress)
                              : tracePaths(transport, kernels, atlas, texels, options, result.pages, progress);

@@ -179,6 +179,7 @@ Expected<AtlasResult> makeAtlas(const Scene& scene, const BakeArguments& a, Comm
 
 Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   if (auto checked = check(a); !checked) return checked;
+  Staging::recover(a.output);
   if (auto writable = checkWritable(a.output); !writable) return writable;
   const ThreadLimit limit(a.threads);
   const int samples = samplesOf(a);

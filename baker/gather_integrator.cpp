@@ -49,15 +49,6 @@ GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKer
   }
   scene_.strategies = lightStrategies(transport, true);
   if (!scene_.strategies.empty()) spreads_.resize(waves_.size() * (scene_.strategies.size() + 1));
-  const std::size_t count = map_.size();
-  sums_.resize(count);
-  coverage_.resize(count);
-  backFaces_.resize(count);
-  place_.resize(count, TexelPlace::Open);
-  samplesOf_.resize(count);
-  reflectance_.resize(count);
-  cache_.resize(count * stored());
-  if (!scene_.levels.endless) levelSums_.resize(count * stored());
   std::vector<std::uint32_t> lengths;
   std::vector<std::uint32_t> pages;
   for (const Wave& wave : waves_) {
@@ -70,7 +61,33 @@ GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKer
     firstProbe_.push_back(probes);
     probes += (page.size() + PathIntegrator::kProbeStride - 1) / PathIntegrator::kProbeStride;
   }
-  probes_.resize(probes);
+  probeCount_ = probes;
+}
+
+void GatherIntegrator::makeCache() {
+  backFaces_.resize(map_.size());
+  place_.resize(map_.size(), TexelPlace::Open);
+  reflectance_.resize(map_.size());
+  cache_.resize(map_.size() * stored());
+}
+
+/// After the warm-up, whose links are gone by then.
+void GatherIntegrator::makeSums() {
+  const std::size_t count = map_.size();
+  sums_.resize(count);
+  coverage_.resize(count);
+  samplesOf_.resize(count);
+  if (!scene_.levels.endless) levelSums_.resize(count * stored());
+  probes_.resize(probeCount_);
+}
+
+/// What texel() does not need: its place is taken by the pages of the result.
+void GatherIntegrator::dropCache() {
+  reflectance_ = std::vector<Vec3>();  // `= {}` would keep the memory
+  cache_ = std::vector<Vec3>();
+  levelSums_ = std::vector<Vec3>();
+  substitutes_ = std::vector<TexelMap::Substitute>();
+  map_.dropPixels();
 }
 
 std::span<LightSpread> GatherIntegrator::spreadsOf(std::size_t wave) {
@@ -114,8 +131,10 @@ Expected<void> GatherIntegrator::run(Progress& progress) {
   const std::uint32_t samples =
       options_.targetError > 0.0f ? std::max(least, static_cast<std::uint32_t>(options_.maxSamples)) : least;
   progress.begin("bake", map_.size() * std::uint64_t{samples});
+  makeCache();
   if (scene_.levels.count > 0)
     if (auto warm = warmUp(progress); !warm) return warm;
+  makeSums();
   double secondsPerSample = 0.0;
   for (std::uint32_t first = 0; first < samples;) {
     const std::uint32_t end = std::min(samples, std::max(kFirstPass, 2 * first));
@@ -129,6 +148,7 @@ Expected<void> GatherIntegrator::run(Progress& progress) {
     if (options_.targetError > 0.0f && end >= std::max(kFirstJudged, least) && markDone() >= kTargetShare) break;
     if (scene_.levels.count > 0 && first < samples) renewCache();
   }
+  dropCache();
   progress.end();
   return {};
 }
@@ -136,9 +156,8 @@ Expected<void> GatherIntegrator::run(Progress& progress) {
 Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   const std::size_t count = map_.size();
   std::vector<CacheLink> links(count * GatherWave::kWarmRays);
-  std::vector<Vec3> direct(count);
-  std::vector<Vec3> seen(count);
-  std::vector<Vec3> relit(count);
+  std::vector<Vec3> first(count);     // light that needs no texel to be known: direct, and what rays see shine
+  std::vector<Vec3> constant(count);  // the same and light from hits without texels
   auto traced = forEachWave(progress, [&](std::size_t w) {
     const Wave& wave = waves_[w];
     const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
@@ -149,9 +168,8 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
         counts);
     for (std::size_t i = 0; i < wave.count; ++i) {
       reflectance_[start + i] = warm[i].reflectance;
-      direct[start + i] = warm[i].direct;
-      seen[start + i] = warm[i].seen;
-      relit[start + i] = warm[i].relit;
+      first[start + i] = warm[i].direct + warm[i].seen;
+      constant[start + i] = first[start + i] + warm[i].relit;
       backFaces_[start + i] = warm[i].backFaces;
     }
     return counts;
@@ -159,16 +177,15 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   if (!traced) return traced;
   findBuried();
   substituteInvalid(std::vector<std::uint32_t>(count, GatherWave::kWarmRays));
-  solveLinks(links, direct, seen, relit);
+  solveLinks(links, std::move(first), constant);
   std::fill(backFaces_.begin(), backFaces_.end(), 0u);
   return {};
 }
 
-void GatherIntegrator::solveLinks(std::span<const CacheLink> links, std::span<const Vec3> direct,
-                                  std::span<const Vec3> seen, std::span<const Vec3> relit) {
+void GatherIntegrator::solveLinks(std::span<const CacheLink> links, std::vector<Vec3> light,
+                                  std::span<const Vec3> constant) {
   const CacheLevels& levels = scene_.levels;
   const std::size_t count = map_.size();
-  std::vector<Vec3> light(count);  // irradiance / pi
   std::vector<Vec3> next(count);
   const auto substitute = [&](std::vector<Vec3>& values) {
     for (const TexelMap::Substitute& s : substitutes_) values[s.texel] = values[s.source];
@@ -177,7 +194,6 @@ void GatherIntegrator::solveLinks(std::span<const CacheLink> links, std::span<co
     for (std::size_t t = 0; t < count; ++t)
       cache_[t * stored() + static_cast<std::size_t>(level)] = reflectance_[t] * light[t];
   };
-  for (std::size_t t = 0; t < count; ++t) light[t] = direct[t] + seen[t];
   substitute(light);
   if (levels.base == 0) keep(0);
   const int sweeps = levels.endless ? kMostSweeps : levels.base + levels.count - 1;
@@ -190,7 +206,7 @@ void GatherIntegrator::solveLinks(std::span<const CacheLink> links, std::span<co
         Vec3 found(0.0f);
         for (const CacheLink& link : links.subspan(t * GatherWave::kWarmRays, GatherWave::kWarmRays))
           if (link.texel != kNoTexel) found += unpackWeight(link.weight) * reflectance_[link.texel] * light[link.texel];
-        next[t] = direct[t] + seen[t] + relit[t] + found / static_cast<float>(GatherWave::kWarmRays);
+        next[t] = constant[t] + found / static_cast<float>(GatherWave::kWarmRays);
         sum += static_cast<double>(luminance(next[t]));
       }
       parts[first / kSweepGrain] = sum;

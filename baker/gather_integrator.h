@@ -70,6 +70,7 @@ class GatherIntegrator {
   /// Errors: Interrupted.
   Expected<void> run(Progress& progress);
 
+  /// After run.
   BakedTexel texel(std::uint32_t page, std::size_t index) const;
 
   std::uint64_t rays() const { return rays_; }
@@ -90,8 +91,11 @@ class GatherIntegrator {
   };
 
   Expected<void> warmUp(Progress& progress);
-  void solveLinks(std::span<const CacheLink> links, std::span<const Vec3> direct, std::span<const Vec3> seen,
-                  std::span<const Vec3> relit);
+  /// `light`: irradiance / pi to begin with; `constant`: what every sweep finds again, links apart.
+  void solveLinks(std::span<const CacheLink> links, std::vector<Vec3> light, std::span<const Vec3> constant);
+  void makeCache();
+  void makeSums();
+  void dropCache();
   Expected<void> pass(std::uint32_t first, std::uint32_t end, Progress& progress);
   void store(std::size_t wave, const GatheredWave& done, std::uint32_t first, std::uint32_t end);
   void renewCache();
@@ -131,6 +135,7 @@ class GatherIntegrator {
   std::vector<TexelPlace> place_;
   std::vector<std::array<Vec3, kProbeNormals>> probes_;
   std::vector<std::size_t> firstProbe_;  // per page
+  std::size_t probeCount_ = 0;
   std::vector<std::uint32_t> samplesOf_;
   std::optional<DoublingError> errors_;
   std::vector<TexelMap::Substitute> substitutes_;

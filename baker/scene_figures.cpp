@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "baker/memory_estimate.h"
+
 namespace lumel {
 namespace {
 
@@ -88,11 +90,12 @@ Json countUvSets(const Scene& scene) {
   return json;
 }
 
-Json estimate(const Totals& totals, const EstimateOptions& options) {
-  // Packed pages are about this full; generated charts stretch little, so area times density squared gives texels.
-  constexpr double kPacking = 0.65;
+Json estimate(const Totals& totals, const BakeSize& scene, const EstimateOptions& options) {
+  // So much of a page is surface; generated charts stretch little, so area times density squared gives texels. Partly
+  // covered ones at the borders of charts come on top.
+  constexpr double kPacking = 0.82;
+  constexpr double kTouched = 1.07;
   constexpr double kBytesPerPageTexel = (3 * 3 + 3 + 4) * sizeof(float);  // what the five images hold
-  constexpr double kBytesPerCoveredTexel = 24.0;                          // coordinates and triangle overlaps
   const double page = static_cast<double>(options.pageSize) * static_cast<double>(options.pageSize);
   const double area = totals.receivingArea;
   if (!(area > 0.0)) return nullptr;
@@ -100,11 +103,14 @@ Json estimate(const Totals& totals, const EstimateOptions& options) {
       options.texelsPerMeter > 0.0f ? static_cast<double>(options.texelsPerMeter) : std::sqrt(kPacking * page / area);
   const double texels = area * density * density;
   const double pages = std::max(1.0, std::ceil(texels / (kPacking * page) - 1e-6));
+  BakeSize size = scene;
+  size.pageTexels = pages * page;
+  size.coveredTexels = kTouched * texels;
   return {{"texelsPerMeter", density},
           {"texels", std::llround(texels)},
           {"pages", std::llround(pages)},
           {"imageBytes", std::llround(pages * page * kBytesPerPageTexel)},
-          {"bakeMemoryBytes", std::llround(pages * page * kBytesPerPageTexel + texels * kBytesPerCoveredTexel)}};
+          {"bakeMemoryBytes", std::llround(bakeMemory(size))}};
 }
 
 }  // namespace
@@ -140,7 +146,7 @@ Json describeScene(const Scene& scene, const EstimateOptions& options) {
   json["images"] = std::move(images);
   json["lights"] = describeLights(scene);
   json["cameras"] = std::move(cameras);
-  json["estimate"] = estimate(totals, options);
+  json["estimate"] = estimate(totals, sceneSize(scene), options);
   json["warnings"] = scene.report.warnings;
   return json;
 }

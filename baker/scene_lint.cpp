@@ -1,5 +1,9 @@
 #include "baker/scene_lint.h"
 
+#include <cmath>
+#include <cstdio>
+
+#include "baker/memory_estimate.h"
 #include "lightmap/lint.h"
 #include "scene/image_io.h"
 
@@ -54,7 +58,9 @@ Expected<void> writePictures(const Atlas& atlas, const std::filesystem::path& fo
 
 Expected<Json> lintScene(const Scene& scene, const SceneLintOptions& options) {
   Progress silent;
-  const Expected<AtlasResult> built = buildAtlas(scene, options.atlas, silent);
+  AtlasOptions atlas = options.atlas;
+  if (atlas.uvSource == UvSource::Scene) atlas.uvSource = UvSource::AsGiven;
+  const Expected<AtlasResult> built = buildAtlas(scene, atlas, silent);
   if (!built) return built.error();
   const LintReport report = lintAtlas(scene, built->atlas, options.atlas.padding);
   if (!options.pictures.empty())
@@ -67,6 +73,13 @@ Expected<Json> lintScene(const Scene& scene, const SceneLintOptions& options) {
     if (finding.count > 0) findings.push_back(findingJson(finding));
   Json lines = Json::array();
   for (const std::string& line : lintText(report)) lines.push_back(line);
+  BakeSize size = sceneSize(scene);
+  size.coveredTexels = report.coveredTexels;
+  size.pageTexels = report.pageTexels;
+  const double memory = bakeMemory(size);
+  char text[80];
+  std::snprintf(text, sizeof text, "about %.0f MB while baking", memory / 1e6);
+  lines.push_back(text);
   for (const std::string& warning : built->report.warnings) lines.push_back("warning: " + warning);
   return Json{{"atlas",
                {{"texelsPerMeter", built->atlas.texelsPerMeter},
@@ -75,6 +88,7 @@ Expected<Json> lintScene(const Scene& scene, const SceneLintOptions& options) {
                 {"pageTexels", report.pageTexels},
                 {"coveredTexels", report.coveredTexels},
                 {"mapBytes", report.mapBytes},
+                {"bakeMemoryBytes", std::llround(memory)},
                 {"nonManifoldEdges", built->report.nonManifoldEdges},
                 {"degenerateTriangles", built->report.degenerateTriangles}}},
               {"sceneUvs", std::move(uvs)},

@@ -22,18 +22,25 @@ class Staging {
   }
   ~Staging();
 
+  /// What processes that were killed left behind in `dir`: what they had not written is removed, and an old result that
+  /// one was about to replace is put back. Also part of make.
+  static void recover(const std::filesystem::path& dir);
+
   /// Where to write a file of the result.
   std::filesystem::path file(const std::string& name) {
     names_.push_back(name);
     return path_ / name;
   }
 
-  /// Moves every file to its place in the order they were named, then drops files of an older result: those that
-  /// `ours` knows and this result does not have. Errors: Failed.
+  /// Puts the new files in the place of an older result's: those of the same names, and others that `ours` knows. They
+  /// stay in the staging folder until all is in place: if a step fails, all is put back. The file named last tells
+  /// readers that a result is there: it leaves first and comes last, so none takes a mixture for a result. Killed in
+  /// between, the folder has no such file until recover. Errors: Failed.
   Expected<void> commit(const std::function<bool(const std::string& name)>& ours);
 
  private:
   Staging() = default;
+  Expected<void> exchange(const std::function<bool(const std::string& name)>& ours, std::vector<std::string>& arrived);
   void swap(Staging& other) {
     std::swap(dir_, other.dir_);
     std::swap(path_, other.path_);

@@ -22,6 +22,9 @@ class TexelMap {
   /// lightmap.
   TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<PageTexels>& texels);
 
+  /// After this find and substitutes may not be asked any more.
+  void dropPixels() { pixels_ = std::vector<std::uint32_t>(); }
+
   std::size_t size() const { return firstOfPage_.back(); }
   std::uint32_t firstOfPage(std::size_t page) const { return firstOfPage_[page]; }
   std::size_t pageOf(std::uint32_t texel) const;

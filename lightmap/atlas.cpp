@@ -51,12 +51,11 @@ class AtlasBuilder {
     const SceneUvs uvs = examineSceneUvs(scene_, receivers_, options_);
     AtlasReport& report = result_.report;
     report.sceneUvs = uvs.reports;
-    std::size_t nextReport = 0;
     for (const SceneUvUse& use : uvs.uses) {
       if (use.used) {
-        while (!report.sceneUvs[nextReport].valid) ++nextReport;
         placed_[static_cast<std::size_t>(use.instance)] =
-            placeSceneUvs(scene_, use.instance, use.page, options_.pageSize, result_.atlas, report.sceneUvs[nextReport++]);
+            placeSceneUvs(scene_, use.instance, use.page, options_.pageSize, result_.atlas,
+                          report.sceneUvs[static_cast<std::size_t>(use.report)]);
       } else {
         generated_.push_back(use.instance);
       }
@@ -65,7 +64,7 @@ class AtlasBuilder {
     for (const UvReport& uv : report.sceneUvs) {
       if (!uv.valid && options_.uvSource == UvSource::Scene)
         return inputError("'" + uv.mesh + "': lightmap UVs cannot be used: " + figures(uv) + "; use --uv auto or generate");
-      if (!uv.valid) report.warnings.push_back("'" + uv.mesh + "': TEXCOORD_1 is not valid (" + figures(uv) + "): charts are generated");
+      if (!uv.valid && options_.uvSource != UvSource::AsGiven) report.warnings.push_back("'" + uv.mesh + "': TEXCOORD_1 is not valid (" + figures(uv) + "): charts are generated");
       if (uv.frameCrossingTexels > 0)
         report.warnings.push_back("'" + uv.mesh + "': " + std::to_string(uv.frameCrossingTexels) +
                                   " texels lie in charts that cross a break of the material's tangent frame");
@@ -135,8 +134,11 @@ class AtlasBuilder {
       report.generatedCharts += unwrapped.charts.size();
     }
     takePlaces(objects, *places, keys);
-    if (earlier && report.keptCharts == 0 && !earlier->charts.empty())
-      report.warnings.push_back("the earlier layout holds no chart of this scene: all charts are placed anew");
+    const bool hadSome = std::any_of(kept.charts.begin(), kept.charts.end(), [](const auto& c) { return c.has_value(); });
+    if (earlier && report.keptCharts == 0 && report.generatedCharts > 0)
+      report.warnings.push_back(std::string("the earlier layout ") +
+                                (hadSome ? "has no room for what changed" : "holds no chart of this scene") +
+                                ": all charts are placed anew");
     return {};
   }
 

@@ -17,6 +17,7 @@ enum class UvSource {
   Auto,      // per mesh: a valid TEXCOORD_1 is used as it is, else charts are generated
   Scene,     // TEXCOORD_1 must be valid: an invalid or missing one is an Input error with figures
   Generate,  // charts are always generated
+  AsGiven,   // TEXCOORD_1 wherever there is one, valid or not: to be examined, not to be baked
 };
 
 struct AtlasOptions {

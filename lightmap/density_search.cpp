@@ -17,12 +17,12 @@ class Placer {
   Placer(const ObjectLayouts& objects, const AtlasOptions& options, Progress& progress)
       : objects_(objects), options_(options), progress_(progress) {}
 
-  Expected<ChartPlaces> placeAt(double scale, bool onePage, const KeptLayout* kept = nullptr) {
+  /// `keptShare`: of the surface of kept charts, the largest of them make up so much; the others find new places.
+  Expected<ChartPlaces> placeAt(double scale, bool onePage, const KeptLayout* kept = nullptr, double keptShare = 1.0) {
     ChartPlaces places;
     places.scale = scale;
     std::vector<PackShape> shapes = makeShapes(scale, places.charts);
-    if (kept)
-      for (std::size_t i = 0; i < shapes.size(); ++i) shapes[i].keep = kept->charts[i];
+    if (kept) keepLargest(*kept, keptShare, shapes);
     PackOptions pack;
     pack.pageSize = options_.pageSize;
     pack.maxPages = onePage ? 1 : 0;
@@ -100,6 +100,28 @@ class Placer {
     return shapes;
   }
 
+  static void keepLargest(const KeptLayout& kept, double share, std::vector<PackShape>& shapes) {
+    std::vector<std::pair<double, std::size_t>> areas;
+    double sum = 0;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      if (!kept.charts[i]) continue;
+      double area = 0;
+      for (const auto& t : shapes[i].triangles) {
+        const Vec2d e1(t[1] - t[0]), e2(t[2] - t[0]);
+        area += 0.5 * std::abs(e1.x * e2.y - e1.y * e2.x);
+      }
+      areas.emplace_back(-area, i);
+      sum += area;
+    }
+    std::sort(areas.begin(), areas.end());
+    double held = 0;
+    for (const auto& [area, i] : areas) {
+      if (held > share * sum) break;
+      shapes[i].keep = kept.charts[i];
+      held -= area;
+    }
+  }
+
   static ChartPlace start(const UnwrappedChart& chart, const Vec2d& scale) {
     ChartPlace place;
     place.scale = scale;
@@ -137,10 +159,11 @@ Expected<ChartPlaces> placeCharts(const ObjectLayouts& objects, const AtlasOptio
                                   const KeptLayout* kept, Progress& progress) {
   Placer placer(objects, options, progress);
   const bool search = !(options.texelsPerMeter > 0);
-  if (kept) {
-    Expected<ChartPlaces> places = placer.placeAt(kept->scale, search, kept);
-    if (places || places.error().kind != ErrorKind::Usage) return places;
-  }
+  if (kept)
+    for (const double share : {1.0, 0.95, 0.8, 0.6}) {
+      Expected<ChartPlaces> places = placer.placeAt(kept->scale, search, kept, share);
+      if (places || places.error().kind != ErrorKind::Usage) return places;
+    }
   if (!search) return placer.placeAt(kept ? kept->scale : 1.0, false);
   return placer.fillOnePage(mostScale > 0 ? mostScale : std::numeric_limits<double>::infinity());
 }

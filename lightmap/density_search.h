@@ -41,8 +41,8 @@ struct ChartPlaces {
   double scale = 1.0;                      // found: multiplies the density that objects were laid out for
 };
 
-/// Places that charts had before, and the scale of then. Where one page must hold all and does not with these places,
-/// there is a new search.
+/// Places that charts had before, and the scale of then. Where one page must hold all and does not so, only the largest
+/// charts are kept, and if that does not help either, there is a new search.
 struct KeptLayout {
   double scale = 1.0;
   std::vector<std::optional<KeptPlace>> charts;  // in the order of ChartPlaces::charts

@@ -85,11 +85,14 @@ SceneUvs examineSceneUvs(const Scene& scene, const std::vector<int>& receivers, 
   std::vector<UvPoints> pages;
   for (const int index : receivers) {
     const Instance& instance = scene.instances[static_cast<std::size_t>(index)];
-    SceneUvUse use{index, false, 0};
+    SceneUvUse use{index, false, 0, -1};
     if (options.uvSource != UvSource::Generate) {
       Examination examined = examine(scene, instance, options.pageSize);
-      if (examined.report.present || options.uvSource == UvSource::Scene) result.reports.push_back(examined.report);
-      if (examined.report.valid) {
+      if (examined.report.present || options.uvSource == UvSource::Scene) {
+        use.report = static_cast<int>(result.reports.size());
+        result.reports.push_back(examined.report);
+      }
+      if (examined.report.valid || (examined.report.present && options.uvSource == UvSource::AsGiven)) {
         use.used = true;
         for (;; ++use.page) {
           if (static_cast<std::size_t>(use.page) == pages.size()) pages.emplace_back(options.pageSize, options.pageSize);

@@ -12,6 +12,7 @@ struct SceneUvUse {
   int instance = 0;
   bool used = false;
   int page = 0;
+  int report = -1;  // into SceneUvs::reports; -1: no TEXCOORD_1
 };
 
 struct SceneUvs {

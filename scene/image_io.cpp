@@ -55,7 +55,37 @@ Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& nam
   return loaded;
 }
 
+/// The extension chooses the decoder: OpenImageIO tries all readers only for files on disk.
+const char* formatOf(std::span<const std::uint8_t> encoded) {
+  const auto startsWith = [&](std::initializer_list<int> magic, std::size_t at = 0) {
+    if (encoded.size() < at + magic.size()) return false;
+    std::size_t i = at;
+    for (int m : magic)
+      if (encoded[i++] != m) return false;
+    return true;
+  };
+  return startsWith({0x89, 'P', 'N', 'G'})                                          ? "png"
+         : startsWith({0xFF, 0xD8})                                                 ? "jpeg"
+         : startsWith({'R', 'I', 'F', 'F'}) && startsWith({'W', 'E', 'B', 'P'}, 8) ? "webp"
+         : startsWith({0x76, 0x2F, 0x31, 0x01})                                     ? "openexr"
+         : startsWith({'D', 'D', 'S', ' '})                                         ? "dds"
+         : startsWith({'B', 'M'})                                                   ? "bmp"
+         : startsWith({'#', '?'})                                                   ? "hdr"
+         : startsWith({'I', 'I', 42, 0}) || startsWith({'M', 'M', 0, 42})           ? "tiff"
+                                                                                    : "targa";
+}
+
 }  // namespace
+
+std::array<int, 2> imageSize(std::span<const std::uint8_t> encoded) {
+  OIIO::Filesystem::IOMemReader memory(const_cast<std::uint8_t*>(encoded.data()), encoded.size());
+  const auto input = OIIO::ImageInput::open(std::string("memory.") + formatOf(encoded), nullptr, &memory);
+  if (!input) {
+    OIIO::geterror();  // or it would be printed at exit
+    return {0, 0};
+  }
+  return {input->spec().width, input->spec().height};
+}
 
 Expected<LoadedImage> readImage(const std::filesystem::path& file) {
   std::error_code ec;
@@ -73,23 +103,7 @@ Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std
   Head head{};
   std::copy_n(encoded.begin(), std::min(encoded.size(), head.size()), head.begin());
   OIIO::Filesystem::IOMemReader memory(const_cast<std::uint8_t*>(encoded.data()), encoded.size());
-  // The extension chooses the decoder: OpenImageIO tries all readers only for files on disk.
-  const auto startsWith = [&](std::initializer_list<int> magic, std::size_t at = 0) {
-    if (encoded.size() < at + magic.size()) return false;
-    std::size_t i = at;
-    for (int m : magic)
-      if (encoded[i++] != m) return false;
-    return true;
-  };
-  const char* format = startsWith({0x89, 'P', 'N', 'G'})                                          ? "png"
-                       : startsWith({0xFF, 0xD8})                                                 ? "jpeg"
-                       : startsWith({'R', 'I', 'F', 'F'}) && startsWith({'W', 'E', 'B', 'P'}, 8) ? "webp"
-                       : startsWith({0x76, 0x2F, 0x31, 0x01})                                     ? "openexr"
-                       : startsWith({'D', 'D', 'S', ' '})                                         ? "dds"
-                       : startsWith({'B', 'M'})                                                   ? "bmp"
-                       : startsWith({'#', '?'})                                                   ? "hdr"
-                       : startsWith({'I', 'I', 42, 0}) || startsWith({'M', 'M', 0, 42})           ? "tiff"
-                                                                                                  : "targa";
+  const char* format = formatOf(encoded);
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
   auto input = OIIO::ImageInput::open(std::string("memory.") + format, &config, &memory);

@@ -1,6 +1,7 @@
 // The one door to OpenImageIO (and through it OpenEXR): images from and to files.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -30,6 +31,9 @@ Expected<LoadedImage> readImage(const std::filesystem::path& file);
 
 /// The same from encoded bytes in memory (glTF images: PNG, JPEG, WebP, ...). `name` is for messages.
 Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std::string& name);
+
+/// Width and height from an image's head alone; 0 x 0 where it cannot be read from memory.
+std::array<int, 2> imageSize(std::span<const std::uint8_t> encoded);
 
 enum class PixelFormat { U8, U16, Half, Float };
 

@@ -86,6 +86,45 @@ TEST(BakeFiles, RemovesWhatAKilledBakeLeft) {
   EXPECT_TRUE(fs::exists(dir / ".lumel-mine.part"));
 }
 
+TEST(BakeFiles, PutsBackWhatABakeKilledBetweenItsRenamesWasReplacing) {
+  const fs::path dir = scratch();
+  ASSERT_TRUE(Fixture(1, 0.25f).write(dir));
+  const auto names = namesIn(dir);
+  // As such a bake leaves it: the old files in its staging folder, new ones half in place.
+  const fs::path old = dir / ".lumel-999999999.part" / "old";
+  const fs::path oldLast = dir / ".lumel-999999999.part" / "old-last";
+  fs::create_directories(old);
+  fs::create_directories(oldLast);
+  for (const std::string& name : names) fs::rename(dir / name, (name == "bake.json" ? oldLast : old) / name);
+  std::ofstream(dir / "lightmap-0-flat.exr") << "new";
+  EXPECT_FALSE(readBake(dir)) << "no mixture is taken for a bake";
+  Staging::recover(dir);
+  EXPECT_EQ(namesIn(dir), names);
+  const auto baked = readBake(dir);
+  ASSERT_TRUE(baked) << baked.error().message;
+  EXPECT_EQ(baked->meanFlat, Vec3(0.25f));
+  // With the new bake.json in place the new bake is whole, and what it replaced may go.
+  fs::create_directories(oldLast);
+  std::ofstream(oldLast / "bake.json") << "old";
+  Staging::recover(dir);
+  EXPECT_EQ(namesIn(dir), names);
+  EXPECT_TRUE(readBake(dir));
+}
+
+TEST(BakeFiles, AFolderInTheWayOfAFileLeavesTheOldResult) {
+  const fs::path dir = scratch();
+  ASSERT_TRUE(Fixture(1, 0.25f).write(dir));
+  fs::create_directories(dir / "lightmap-1-flat.exr" / "inside");
+  const auto written = Fixture(2, 0.5f).write(dir);
+  ASSERT_FALSE(written);
+  EXPECT_NE(written.error().message.find("lightmap-1-flat.exr"), std::string::npos);
+  EXPECT_TRUE(fs::exists(dir / "lightmap-1-flat.exr" / "inside"));
+  EXPECT_EQ(namesIn(dir).size(), 8u);
+  const auto baked = readBake(dir);
+  ASSERT_TRUE(baked) << baked.error().message;
+  EXPECT_EQ(baked->meanFlat, Vec3(0.25f));
+}
+
 TEST(BakeFiles, ReadBackIsWhatWasWritten) {
   const fs::path dir = scratch();
   Fixture fixture(2, 0.25f);

@@ -236,6 +236,75 @@ TEST(SnapFactors, LeaveRoomForTheMarginOnBlocks) {
   EXPECT_NEAR(factors.y * 30.9, 30.0, 1e-5);
 }
 
+/// The shapes with the places that a packing gave them.
+std::vector<PackShape> keeping(std::vector<PackShape> shapes, const PackResult& result) {
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    const Placement& p = result.placements[i];
+    shapes[i].keep = KeptPlace{p.page, p.quarterTurns, p.x, p.y};
+  }
+  return shapes;
+}
+
+TEST(PackKept, ShapesStayAndNewOnesFillTheRoomBetween) {
+  for (const int block : {0, 4}) {
+    const PackOptions options{.pageSize = 128, .padding = 2, .blockAlign = block};
+    const std::vector<PackShape> before = randomStars(300, 5.0f, 21);
+    const PackResult first = pack(before, options);
+    ASSERT_GT(first.pages.size(), 2u);
+    std::vector<PackShape> after = keeping(before, first);
+    for (std::size_t i = 0; i < 20; ++i) {  // other shapes in place of some
+      after[i * 7].keep.reset();
+      after[i * 7].triangles = randomStars(1, 4.0f, static_cast<unsigned>(100 + i))[0].triangles;
+    }
+    const PackResult second = pack(after, options);
+    for (std::size_t i = 0; i < after.size(); ++i) {
+      EXPECT_EQ(second.placements[i].kept, after[i].keep.has_value());
+      if (!after[i].keep) continue;
+      EXPECT_EQ(second.placements[i].page, first.placements[i].page);
+      EXPECT_EQ(second.placements[i].quarterTurns, first.placements[i].quarterTurns);
+      EXPECT_EQ(second.placements[i].offset, first.placements[i].offset);
+    }
+    EXPECT_LE(second.pages.size(), first.pages.size() + 1) << "what was taken away left room for most";
+    const auto owners = ownersByBruteForce(after, second);
+    for (std::size_t page = 0; page < second.pages.size(); ++page) {
+      int toBorder = 100;
+      EXPECT_GE(leastGap(owners[page], second.pages[page][0], second.pages[page][1], 3, &toBorder), 2);
+      EXPECT_GE(toBorder, 1);
+    }
+  }
+}
+
+TEST(PackKept, ANewGroupStaysTogetherOnANewPageWhereNoPageHasRoomForAllOfIt) {
+  std::vector<PackShape> shapes(3, rectangle(40, 60));
+  const PackOptions options{.pageSize = 128, .padding = 2};
+  const PackResult first = pack(shapes, options);
+  shapes = keeping(shapes, first);
+  for (int i = 0; i < 4; ++i) {
+    shapes.push_back(rectangle(50, 50));
+    shapes.back().group = 1;
+  }
+  const PackResult second = pack(shapes, options);
+  ASSERT_EQ(second.pages.size(), 2u);
+  for (std::size_t i = 0; i < shapes.size(); ++i) EXPECT_EQ(second.placements[i].page, i < 3 ? 0 : 1);
+}
+
+TEST(PackKept, PlacesThatCannotBeKeptAreGivenUp) {
+  std::vector<PackShape> shapes(8, rectangle(10, 20));
+  constexpr int kFar = 1 << 30;
+  const KeptPlace places[] = {{0, 0, 5, 5}, {0, 0, 14, 5}, {0, 0, -3, 5}, {0, 0, kFar, kFar},
+                              {7, 0, 40, 5}, {-1, 0, 40, 5}, {0, 9, 40, 5}, {1, 1, 20, 30}};
+  for (std::size_t i = 0; i < shapes.size(); ++i) shapes[i].keep = places[i];
+  const PackResult result = pack(shapes, {.pageSize = 64, .padding = 2});
+  EXPECT_TRUE(result.placements[0].kept);
+  EXPECT_FALSE(result.placements[1].kept) << "a texel short of the padding";
+  EXPECT_FALSE(result.placements[2].kept) << "off the page";
+  EXPECT_FALSE(result.placements[3].kept) << "far off the page";
+  EXPECT_FALSE(result.placements[6].kept) << "no such turn";
+  EXPECT_TRUE(result.placements[7].kept) << "a page that nothing else asked for";
+  for (const Placement& p : result.placements) EXPECT_GE(p.page, 0);
+  ownersByBruteForce(shapes, result);
+}
+
 TEST(Pack, SameForAnyThreadCount) {
   const std::vector<PackShape> shapes = randomStars(1500, 6.0f, 11);
   const PackOptions options{.pageSize = 256, .padding = 2};

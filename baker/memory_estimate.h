@@ -1,0 +1,24 @@
+// How much memory a bake takes, told in advance.
+#pragma once
+
+#include "scene/scene.h"
+
+namespace lumel {
+
+/// What a bake's memory depends on.
+struct BakeSize {
+  double pageTexels = 0.0;
+  double coveredTexels = 0.0;
+  double triangles = 0.0;     // of all instances
+  double encodedBytes = 0.0;  // of images, as they are in their files
+  double decodedTexels = 0.0;  // of images that shade or emit
+};
+
+/// Triangles and images of a scene; texels are left at 0.
+BakeSize sceneSize(const Scene& scene);
+
+/// Peak resident memory of `lumel bake` in bytes, the program and its libraries included. README has the model and how
+/// far it was off for real scenes.
+double bakeMemory(const BakeSize& size);
+
+}  // namespace lumel
