@@ -54,9 +54,10 @@ class Study {
     LUMEL_CHECK(bool(result));
     return *std::move(result);
   }
-  /// Texels inside of things hold nothing of use; with a door, those of the room without lamp count.
+  /// Texels inside of things hold nothing of use, and at their edge path tracing counts what lies inside; with a door,
+  /// texels of the room without lamp count.
   bool counts(TexelCoord at) const {
-    if (validity_.at(at.x, at.y)[1] < 0.5f) return false;
+    if (validity_.at(at.x, at.y)[1] < 0.99f) return false;
     if (!door_) return true;
     for (std::size_t i = 0; i < texels_[0].size(); ++i)
       if (texels_[0].coords[i].x == at.x && texels_[0].coords[i].y == at.y) {
