@@ -15,6 +15,7 @@ namespace lumel {
 namespace {
 
 constexpr double kSmoothCrease = 0.25;  // weight of a crease that is shaded smooth
+constexpr double kTinyTexels = 4.0;     // charts of less area should find a neighbour if any way can be found
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 struct Border {
@@ -37,15 +38,16 @@ struct Candidate {
 /// light had better share texels than be alone in a texel with a gutter around it.
 double creaseLimit(double area, double perimeter) {
   const double width = 2 * area / perimeter;
-  if (area < 4 || width < 0.75) return 1.2;   // just over a right angle
+  if (area < kTinyTexels || width < 0.75) return 1.2;   // just over a right angle
   if (area < 16 || width < 1.5) return 0.75;  // 75 degrees
   return 0.5;                                 // 60 degrees
 }
 
 class PartMerger {
  public:
-  PartMerger(const HalfEdgeMesh& mesh, std::vector<FlatChart*> charts, const std::vector<std::uint32_t>& localTriangle, const MergeOptions& options)
-      : mesh_(mesh), options_(options), charts_(std::move(charts)), sheet_(mesh, charts_, localTriangle) {}
+  PartMerger(const HalfEdgeMesh& mesh, std::vector<FlatChart*> charts, const std::vector<std::uint32_t>& localTriangle,
+              const std::vector<FrameBreak>& breaks, const MergeOptions& options)
+      : mesh_(mesh), options_(options), charts_(std::move(charts)), sheet_(mesh, charts_, localTriangle, breaks) {}
 
   std::vector<FlatChart> run() {
     makeBorders();
@@ -126,15 +128,16 @@ class PartMerger {
 
   /// Joins the charts as they are, by a rigid motion.
   bool moveTo(const Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared) {
-    RigidMotion motion;
-    std::vector<MeshEdge> matched;
-    if (!sheet_.fit(shared, smallChartSlack(sheet_.chart(from).normals.area), motion, matched)) return false;
-    double matchedLength = 0;
-    for (const MeshEdge edge : matched) matchedLength += sheet_.length(edge);
     constexpr double kLeastMatch = 0.25;  // of the common border: half a pipe meets the other half along one of two
-    if (matchedLength < kLeastMatch * border.length || !sheet_.mayJoin(into, from, motion, matched, options_)) return false;
-    sheet_.join(into, from, motion, matched);
-    return true;
+    const double smaller = std::min(sheet_.chart(into).normals.area, sheet_.chart(from).normals.area);
+    for (const Fit& fit : sheet_.fits(shared, smallChartSlack(smaller))) {
+      // What is too small for a chart of its own may hang on by any edge.
+      if (smaller >= kTinyTexels && fit.length < kLeastMatch * border.length) return false;
+      if (!sheet_.mayJoin(into, from, fit, options_)) continue;
+      sheet_.join(into, from, fit);
+      return true;
+    }
+    return false;
   }
 
   /// Flattens both anew as one chart: for curved surfaces, whose borders do not meet rigidly.
@@ -155,6 +158,7 @@ class PartMerger {
     Flattening flattened = flatten(flat.mesh, {options_.maxStretch, options_.largestSide});
     if (!flattened.valid) return false;
     flat.uvs = std::move(flattened.uvs);
+    if (sheet_.closesBreak(into, from, flat)) return false;
     sheet_.replace(into, from, flat);
     return true;
   }
@@ -255,13 +259,18 @@ std::vector<FlatChart> mergeCharts(const HalfEdgeMesh& mesh, std::vector<FlatCha
     parts[part].push_back(&charts[c]);
     for (const std::uint32_t t : charts[c].mesh.meshTriangles) localTriangle[t] = partTriangles[part]++;
   }
+  std::vector<std::vector<FrameBreak>> breaks(parts.size());
+  for (const FrameBreak& edge : mesh.frameBreaks) {
+    const std::uint32_t part = partOf[findRoot(parent, chartOf[edge.cornerA / 3])];
+    if (part == partOf[findRoot(parent, chartOf[edge.cornerB / 3])]) breaks[part].push_back(edge);
+  }
   std::vector<std::vector<FlatChart>> merged(parts.size());
   parallelFor(parts.size(), 1, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       if (parts[i].size() == 1)
         merged[i].push_back(std::move(*parts[i][0]));
       else
-        merged[i] = PartMerger(mesh, parts[i], localTriangle, options).run();
+        merged[i] = PartMerger(mesh, parts[i], localTriangle, breaks[i], options).run();
     }
   });
   std::vector<FlatChart> result;

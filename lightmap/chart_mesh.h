@@ -29,7 +29,17 @@ void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart);
 struct FlatTriangle {
   double x1 = 0, x2 = 0, y2 = 0;
 };
+FlatTriangle layFlat(const std::array<Vec3d, 3>& corners);
 FlatTriangle layFlat(const ChartMesh& chart, std::size_t triangle);
+
+/// Of the linear map from the surface's triangle to the texture's; `small` is not positive where that is turned over.
+struct SingularValues {
+  double big = 0, small = 0;
+
+  /// Whether no length is changed by more than a factor of `limit`, and nothing is turned over.
+  bool within(double limit) const { return big <= limit && small * limit >= 1; }
+};
+SingularValues singularValues(const FlatTriangle& surface, const std::array<Vec2d, 3>& uv);
 
 /// Sander, Snyder, Gortler and Hoppe 2001, "Texture Mapping Progressive Meshes": singular values of the map from the
 /// texture to the surface, with a chart scaled to its surface's area.

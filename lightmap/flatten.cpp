@@ -117,9 +117,21 @@ std::vector<Vec2d> unroll(const ChartMesh& chart) {
 /// Local/global iterations: rotations per triangle, then one solve with a matrix that is factored once.
 class RigidRelaxation {
  public:
-  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), flat_(chart.triangles.size()) {
+  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), flat_(chart.triangles.size()), emphasis_(chart.triangles.size(), 1.0) {
     for (std::size_t t = 0; t < flat_.size(); ++t) flat_[t] = layFlat(chart, t);
     solver_.compute(laplacian());
+  }
+
+  /// Iteratively reweighted towards a fourth power of the error: triangles beyond `limit` pull harder, so that the
+  /// distortion spreads from where it is worst.
+  void emphasiseWorst(const std::vector<Vec2d>& uvs, double limit) {
+    for (std::size_t t = 0; t < flat_.size(); ++t) {
+      const double excess = (worstStretch(t, uvs) - 1) / (limit - 1);
+      constexpr double kLeast = 0.1, kMost = 4.0;
+      const double wanted = std::clamp(excess, kLeast, kMost);
+      emphasis_[t] = std::sqrt(emphasis_[t] * wanted * wanted);
+    }
+    solver_.factorize(laplacian());
   }
 
   bool usable() const { return solver_.info() == Eigen::Success; }
@@ -156,7 +168,7 @@ class RigidRelaxation {
     std::vector<Entry> entries;
     entries.reserve(3 * flat_.size());
     for (std::size_t t = 0; t < flat_.size(); ++t) {
-      const std::array<double, 3> weight = cotangents(flat_[t]);
+      const std::array<double, 3> weight = cotangents(t);
       for (std::size_t k = 0; k < 3; ++k) {
         const std::uint32_t i = chart_.triangles[t][k];
         const std::uint32_t j = chart_.triangles[t][(k + 1) % 3];
@@ -184,22 +196,30 @@ class RigidRelaxation {
     return matrix;
   }
 
+  /// The larger of the greatest singular value and the inverse of the least; very large where turned over.
+  double worstStretch(std::size_t t, const std::vector<Vec2d>& uvs) const {
+    const auto& v = chart_.triangles[t];
+    const SingularValues s = singularValues(flat_[t], {uvs[v[0]], uvs[v[1]], uvs[v[2]]});
+    return s.small > 0 ? std::max(s.big, 1 / s.small) : 1e3;
+  }
+
   static std::array<Vec2d, 3> edges(const FlatTriangle& f) {
     return {Vec2d(f.x1, 0), Vec2d(f.x2 - f.x1, f.y2), Vec2d(-f.x2, -f.y2)};
   }
 
   /// Of the angle opposite each edge (k, k + 1).
-  static std::array<double, 3> cotangents(const FlatTriangle& f) {
+  std::array<double, 3> cotangents(std::size_t t) const {
+    const FlatTriangle& f = flat_[t];
     const std::array<Vec2d, 3> e = edges(f);
     const double area2 = f.x1 * f.y2;
     std::array<double, 3> cot;
-    for (std::size_t k = 0; k < 3; ++k) cot[k] = -glm::dot(e[(k + 1) % 3], e[(k + 2) % 3]) / area2;
+    for (std::size_t k = 0; k < 3; ++k) cot[k] = -emphasis_[t] * glm::dot(e[(k + 1) % 3], e[(k + 2) % 3]) / area2;
     return cot;
   }
 
   void addTriangle(std::size_t t, const std::vector<Vec2d>& uvs, Eigen::MatrixX2d& right) const {
     const std::array<Vec2d, 3> e = edges(flat_[t]);
-    const std::array<double, 3> weight = cotangents(flat_[t]);
+    const std::array<double, 3> weight = cotangents(t);
     const auto& v = chart_.triangles[t];
     double cosine = 0, sine = 0;  // of the rotation that fits best, not yet normalised
     for (std::size_t k = 0; k < 3; ++k) {
@@ -225,6 +245,7 @@ class RigidRelaxation {
 
   const ChartMesh& chart_;
   std::vector<FlatTriangle> flat_;
+  std::vector<double> emphasis_;  // per triangle: multiplies its cotangents
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
 };
 
@@ -241,9 +262,28 @@ bool isDevelopable(const ChartMesh& chart, std::span<const Vec2d> uvs, const Fla
   return stretch.flipped == 0 && stretch.badShare <= kMaxBadShare / 4 && stretch.l2 <= kIsometricL2;
 }
 
+/// A layout without flips that fails by little of its surface: evens the stretch out.
+bool spreadStretch(const ChartMesh& chart, RigidRelaxation& relaxation, std::vector<Vec2d>& uvs, const FlattenOptions& options) {
+  constexpr double kHopelessShare = 0.1;       // of the surface
+  constexpr std::size_t kMostTriangles = 8000; // each round is a factorization
+  constexpr int kRounds = 8, kStepsPerRound = 4;
+  if (chart.triangles.size() > kMostTriangles) return false;
+  const Stretch before = measureStretch(chart, uvs, options.maxStretch);
+  if (before.flipped > 0 || before.badShare > kHopelessShare) return false;
+  for (int round = 0; round < kRounds; ++round) {
+    relaxation.emphasiseWorst(uvs, options.maxStretch);
+    if (!relaxation.usable()) return false;
+    for (int i = 0; i < kStepsPerRound; ++i)
+      if (relaxation.step(uvs) < 0) return false;
+    scaleToSurface(chart, uvs);
+    if (isGood(chart, uvs, options)) return true;
+  }
+  return false;
+}
+
 /// Relaxes until nothing moves. False: the chart cannot be laid flat well.
 bool relax(const ChartMesh& chart, std::vector<Vec2d>& uvs, const FlattenOptions& options) {
-  const RigidRelaxation relaxation(chart);
+  RigidRelaxation relaxation(chart);
   if (!relaxation.usable()) return false;
   double l2 = 0;
   for (int i = 0; i < kMaxIterations; ++i) {
@@ -257,7 +297,8 @@ bool relax(const ChartMesh& chart, std::vector<Vec2d>& uvs, const FlattenOptions
     l2 = now.l2;
   }
   scaleToSurface(chart, uvs);
-  return isGood(chart, uvs, options);
+  if (isGood(chart, uvs, options)) return true;
+  return spreadStretch(chart, relaxation, uvs, options);
 }
 
 }  // namespace
