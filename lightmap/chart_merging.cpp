@@ -39,7 +39,8 @@ struct Candidate {
 double creaseLimit(double area, double perimeter) {
   const double width = 2 * area / perimeter;
   if (area < kTinyTexels || width < 0.75) return 1.2;   // just over a right angle
-  if (area < 16 || width < 1.5) return 0.75;  // 75 degrees
+  if (width < 1.5) return 1.05;
+  if (area < 16) return 0.75;  // 75 degrees
   return 0.5;                                 // 60 degrees
 }
 
