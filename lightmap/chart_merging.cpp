@@ -124,16 +124,18 @@ class PartMerger {
     if (sheet_.chart(into).triangles.size() < sheet_.chart(from).triangles.size()) std::swap(into, from);
     std::vector<MeshEdge> shared;
     for (const MeshEdge edge : border.edges) shared.push_back(sheet_.chartOf(edge.triangle) == into ? edge : sheet_.beyond(edge));
-    if (moveTo(border, into, from, shared) || flattenAsOne(border, into, from, shared)) merged(index, into, from);
+    // A long common border first; what meets by little of it only where no flattening of both does better.
+    constexpr double kMuch = 0.25, kLittle = 0.12;  // of the border: half a pipe meets the other half along one of two
+    if (moveTo(border, into, from, shared, kMuch) || flattenAsOne(border, into, from, shared) || moveTo(border, into, from, shared, kLittle))
+      merged(index, into, from);
   }
 
-  /// Joins the charts as they are, by a rigid motion.
-  bool moveTo(const Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared) {
-    constexpr double kLeastMatch = 0.25;  // of the common border: half a pipe meets the other half along one of two
+  /// Joins the charts as they are, by a rigid motion that lets at least a share of the border meet.
+  bool moveTo(const Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared, double leastMatch) {
     const double smaller = std::min(sheet_.chart(into).normals.area, sheet_.chart(from).normals.area);
     for (const Fit& fit : sheet_.fits(shared, smallChartSlack(smaller))) {
       // What is too small for a chart of its own may hang on by any edge.
-      if (smaller >= kTinyTexels && fit.length < kLeastMatch * border.length) return false;
+      if (smaller >= kTinyTexels && fit.length < leastMatch * border.length) return false;
       if (!sheet_.mayJoin(into, from, fit, options_)) continue;
       sheet_.join(into, from, fit);
       return true;
@@ -144,7 +146,7 @@ class PartMerger {
   /// Flattens both anew as one chart: for curved surfaces, whose borders do not meet rigidly.
   bool flattenAsOne(Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared) {
     constexpr std::size_t kMostTriangles = 4000;   // keeps the number of flattenings times their cost near linear
-    constexpr double kMostConeVariance = 0.06;     // not worth the attempt
+    constexpr double kMostConeVariance = 0.12;     // not worth the attempt
     constexpr double kLeastBorder = 0.1;           // of the smaller one's perimeter: no chart with a narrow waist
     constexpr double kGrowth = 1.3;                // since the last attempt
     const ChartSheet::Chart& a = sheet_.chart(into);
