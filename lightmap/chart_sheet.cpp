@@ -209,6 +209,8 @@ std::vector<Fit> ChartSheet::fits(const std::vector<MeshEdge>& shared, double sl
 
 bool ChartSheet::staysGood(std::uint32_t triangle, const std::array<Vec2d, 3>& uv, double maxStretch) const {
   const auto& v = mesh_.triangles[triangle];
+  // A sliver may lie turned over by less than a float UV can tell, but no further.
+  if (!(doubleArea(uv) > 0)) return !(doubleArea(corners(triangle)) > 0) && !isFlipped(uv);
   const FlatTriangle surface = layFlat({mesh_.points[v[0]], mesh_.points[v[1]], mesh_.points[v[2]]});
   return singularValues(surface, uv).within(maxStretch);
 }
@@ -256,7 +258,7 @@ bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit,
       low = glm::min(low, uv[k]);
       high = glm::max(high, uv[k]);
     }
-    if (touched && doubleArea(corners(t)) > 0 && !staysGood(t, uv, maxStretch)) return false;
+    if (touched && !staysGood(t, uv, maxStretch)) return false;
     for (std::uint32_t k = 0; k < 3; ++k) {
       if (joined_[localTriangle_[t]][k]) continue;
       bool hit = false;

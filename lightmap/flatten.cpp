@@ -9,7 +9,6 @@ namespace lumel {
 namespace {
 
 constexpr double kFlatCosine = 0.9998;    // within 1.15 degrees of the plane: projection shortens by 0.02 %
-constexpr double kThinTexels = 0.01;      // triangles thinner than this may stand askew: nothing of it shows
 constexpr double kOverlapTexels = 2e-3;   // parts may lie on each other by less: far below a sample's distance
 constexpr double kMaxBadShare = 0.004;    // of a chart's surface, beyond the stretch limit
 constexpr double kMaxL2 = 1.03;
@@ -32,9 +31,7 @@ double worstCosine(const ChartMesh& chart, Vec3d normal) {
     const auto& v = chart.triangles[t];
     const Vec3d n = glm::cross(chart.points[v[1]] - chart.points[v[0]], chart.points[v[2]] - chart.points[v[0]]);
     const double area = glm::length(n);
-    const FlatTriangle flat = layFlat(chart, t);
-    const double longest = std::max({flat.x1, std::hypot(flat.x2, flat.y2), std::hypot(flat.x2 - flat.x1, flat.y2)});
-    if (area < kThinTexels * longest) continue;
+    if (shortestHeight(layFlat(chart, t)) < kThinTexels) continue;
     worst = std::min(worst, glm::dot(n, normal) / area);
   }
   return worst;
