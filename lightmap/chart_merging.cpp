@@ -6,6 +6,7 @@
 #include <numeric>
 #include <queue>
 
+#include "lightmap/border_graph.h"
 #include "lightmap/chart_growing.h"
 #include "lightmap/chart_sheet.h"
 #include "lightmap/flatten.h"
@@ -19,11 +20,16 @@ constexpr double kTinyTexels = 4.0;     // charts of less area should find a nei
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 struct Border {
-  std::uint32_t a = 0, b = 0;
   std::vector<MeshEdge> edges;  // from the side of either chart
   double length = 0, crease = 0;
   double refusedArea = 0;  // of both charts together when flattening them as one failed
-  bool alive = true;
+
+  void absorb(Border& other) {
+    edges.insert(edges.end(), other.edges.begin(), other.edges.end());
+    length += other.length;
+    crease += other.crease;
+    other.edges = {};
+  }
 };
 
 struct Candidate {
@@ -48,15 +54,15 @@ class PartMerger {
  public:
   PartMerger(const HalfEdgeMesh& mesh, std::vector<FlatChart*> charts, const std::vector<std::uint32_t>& localTriangle,
               const std::vector<FrameBreak>& breaks, const MergeOptions& options)
-      : mesh_(mesh), options_(options), charts_(std::move(charts)), sheet_(mesh, charts_, localTriangle, breaks) {}
+      : mesh_(mesh), options_(options), charts_(std::move(charts)), sheet_(mesh, charts_, localTriangle, breaks), borders_(charts_.size()) {}
 
   std::vector<FlatChart> run() {
     makeBorders();
     while (!queue_.empty()) {
       const Candidate top = queue_.top();
       queue_.pop();
-      if (!borders_[top.border].alive) continue;
-      const double now = cost(borders_[top.border]);
+      if (!borders_.isAlive(top.border)) continue;
+      const double now = cost(top.border);
       if (now > top.cost * 1.0001 + 1e-9) {
         if (std::isfinite(now)) queue_.push({static_cast<float>(now), top.border});
         continue;
@@ -67,12 +73,7 @@ class PartMerger {
   }
 
  private:
-  static std::uint64_t key(std::uint32_t a, std::uint32_t b) {
-    return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
-  }
-
   void makeBorders() {
-    bordersOf_.resize(charts_.size());
     members_.resize(charts_.size());
     for (std::uint32_t c = 0; c < charts_.size(); ++c) {
       members_[c] = {c};
@@ -88,13 +89,7 @@ class PartMerger {
     const auto other = static_cast<std::uint32_t>(mesh_.neighbours[edge.triangle][edge.k]);
     const std::uint32_t d = sheet_.chartOf(other);
     if (d <= c) return;  // a cut inside a chart, or met from the other side
-    const auto [place, isNew] = borderOf_.try_emplace(key(c, d), static_cast<std::uint32_t>(borders_.size()));
-    if (isNew) {
-      borders_.push_back({c, d, {}, 0, 0, 0, true});
-      bordersOf_[c].push_back(place->second);
-      bordersOf_[d].push_back(place->second);
-    }
-    Border& border = borders_[place->second];
+    Border& border = borders_[borders_.between(c, d)];
     border.edges.push_back(edge);
     const Vec3d n = areaNormal(mesh_, edge.triangle);
     const Vec3d m = areaNormal(mesh_, other);
@@ -105,12 +100,13 @@ class PartMerger {
   }
 
   void push(std::uint32_t border) {
-    if (const double c = cost(borders_[border]); std::isfinite(c)) queue_.push({static_cast<float>(c), border});
+    if (const double c = cost(border); std::isfinite(c)) queue_.push({static_cast<float>(c), border});
   }
 
-  double cost(const Border& border) const {
-    const ChartSheet::Chart& a = sheet_.chart(border.a);
-    const ChartSheet::Chart& b = sheet_.chart(border.b);
+  double cost(std::uint32_t index) const {
+    const Border& border = borders_[index];
+    const ChartSheet::Chart& a = sheet_.chart(borders_.ends(index)[0]);
+    const ChartSheet::Chart& b = sheet_.chart(borders_.ends(index)[1]);
     const ChartSheet::Chart& smaller = a.normals.area < b.normals.area ? a : b;
     const double crease = border.crease / border.length;
     if (crease > creaseLimit(smaller.normals.area, smaller.perimeter)) return kNever;
@@ -119,15 +115,14 @@ class PartMerger {
 
   void tryMerge(std::uint32_t index) {
     Border& border = borders_[index];
-    std::uint32_t into = border.a;
-    std::uint32_t from = border.b;
+    auto [into, from] = borders_.ends(index);
     if (sheet_.chart(into).triangles.size() < sheet_.chart(from).triangles.size()) std::swap(into, from);
     std::vector<MeshEdge> shared;
     for (const MeshEdge edge : border.edges) shared.push_back(sheet_.chartOf(edge.triangle) == into ? edge : sheet_.beyond(edge));
     // A long common border first; what meets by little of it only where no flattening of both does better.
     constexpr double kMuch = 0.25, kLittle = 0.12;  // of the border: half a pipe meets the other half along one of two
     if (moveTo(border, into, from, shared, kMuch) || flattenAsOne(border, into, from, shared) || moveTo(border, into, from, shared, kLittle))
-      merged(index, into, from);
+      merged(into, from);
   }
 
   /// Joins the charts as they are, by a rigid motion that lets at least a share of the border meet.
@@ -166,34 +161,12 @@ class PartMerger {
     return true;
   }
 
-  void merged(std::uint32_t index, std::uint32_t into, std::uint32_t from) {
+  void merged(std::uint32_t into, std::uint32_t from) {
     members_[into].insert(members_[into].end(), members_[from].begin(), members_[from].end());
     members_[from].clear();
-    borders_[index].alive = false;
-    for (const std::uint32_t moved : bordersOf_[from]) moveBorder(moved, from, into);
-    bordersOf_[from].clear();
+    borders_.merge(from, into, [](std::uint32_t) {});
     // What was refused may fit the grown chart.
-    for (const std::uint32_t i : bordersOf_[into])
-      if (borders_[i].alive) push(i);
-  }
-
-  void moveBorder(std::uint32_t moved, std::uint32_t from, std::uint32_t to) {
-    Border& border = borders_[moved];
-    if (!border.alive) return;
-    const std::uint32_t other = border.a == from ? border.b : border.a;
-    const auto [place, isNew] = borderOf_.try_emplace(key(to, other), moved);
-    if (isNew) {
-      border.a = to;
-      border.b = other;
-      bordersOf_[to].push_back(moved);
-      return;
-    }
-    Border& kept = borders_[place->second];
-    kept.edges.insert(kept.edges.end(), border.edges.begin(), border.edges.end());
-    kept.length += border.length;
-    kept.crease += border.crease;
-    border.alive = false;
-    border.edges = {};
+    borders_.forEachOf(into, [this](std::uint32_t border) { push(border); });
   }
 
   std::vector<FlatChart> collect() {
@@ -220,10 +193,8 @@ class PartMerger {
   const MergeOptions& options_;
   std::vector<FlatChart*> charts_;
   ChartSheet sheet_;
-  std::vector<Border> borders_;
-  std::vector<std::vector<std::uint32_t>> bordersOf_;  // per chart
+  BorderGraph<Border> borders_;
   std::vector<std::vector<std::uint32_t>> members_;    // per chart: the charts that it is made of
-  std::unordered_map<std::uint64_t, std::uint32_t> borderOf_;  // looked up only; keys of merged charts are left behind
   std::priority_queue<Candidate> queue_;
 };
 

@@ -3,7 +3,8 @@
 #include <Eigen/Sparse>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
-#include <queue>
+
+#include "lightmap/nested_dissection.h"
 
 namespace lumel {
 namespace {
@@ -114,7 +115,10 @@ std::vector<Vec2d> unroll(const ChartMesh& chart) {
 /// Local/global iterations: rotations per triangle, then one solve with a matrix that is factored once.
 class RigidRelaxation {
  public:
-  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), flat_(chart.triangles.size()), emphasis_(chart.triangles.size(), 1.0) {
+  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), flat_(chart.triangles.size()), emphasis_(chart.triangles.size(), 1.0), row_(chart.points.size()) {
+    const std::vector<std::uint32_t> order = nestedDissection(chart.points, chart.triangles);
+    for (std::uint32_t i = 0; i < order.size(); ++i) row_[order[i]] = i;
+    fixed_ = order.back();
     for (std::size_t t = 0; t < flat_.size(); ++t) flat_[t] = layFlat(chart, t);
     solver_.compute(laplacian());
   }
@@ -140,10 +144,10 @@ class RigidRelaxation {
     const Eigen::MatrixX2d solved = solver_.solve(right);
     if (!solved.allFinite()) return -1;
     double moved = 0;
-    const Vec2d shift = uvs[0];
-    uvs[0] = Vec2d(0.0);
-    for (std::size_t i = 1; i < uvs.size(); ++i) {
-      const Vec2d now(solved(static_cast<Eigen::Index>(i) - 1, 0), solved(static_cast<Eigen::Index>(i) - 1, 1));
+    const Vec2d shift = uvs[fixed_];
+    for (std::size_t i = 0; i < uvs.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(row_[i]);
+      const Vec2d now = i == fixed_ ? Vec2d(0.0) : Vec2d(solved(row, 0), solved(row, 1));
       const Vec2d delta = now + shift - uvs[i];
       moved += glm::dot(delta, delta);
       uvs[i] = now;
@@ -158,35 +162,35 @@ class RigidRelaxation {
     bool operator<(const Entry& other) const { return column != other.column ? column < other.column : row < other.row; }
   };
 
-  /// Cotangent Laplacian without point 0, lower triangle; assembled in place, at 16 bytes per triangle side.
+  /// Cotangent Laplacian without the fixed point, lower triangle; assembled in place, at 16 bytes per triangle side.
   Eigen::SparseMatrix<double> laplacian() const {
-    const auto unknowns = static_cast<Eigen::Index>(chart_.points.size() - 1);  // point 0 stays at the origin
+    const auto unknowns = static_cast<std::uint32_t>(chart_.points.size() - 1);  // the last point stays at the origin
     std::vector<double> diagonal(chart_.points.size(), 0.0);
     std::vector<Entry> entries;
     entries.reserve(3 * flat_.size());
     for (std::size_t t = 0; t < flat_.size(); ++t) {
       const std::array<double, 3> weight = cotangents(t);
       for (std::size_t k = 0; k < 3; ++k) {
-        const std::uint32_t i = chart_.triangles[t][k];
-        const std::uint32_t j = chart_.triangles[t][(k + 1) % 3];
+        const std::uint32_t i = row_[chart_.triangles[t][k]];
+        const std::uint32_t j = row_[chart_.triangles[t][(k + 1) % 3]];
         diagonal[i] += weight[k];
         diagonal[j] += weight[k];
-        if (i > 0 && j > 0) entries.push_back({std::min(i, j) - 1, std::max(i, j) - 1, weight[k]});
+        if (i < unknowns && j < unknowns) entries.push_back({std::min(i, j), std::max(i, j), weight[k]});
       }
     }
     std::sort(entries.begin(), entries.end());
     Eigen::SparseMatrix<double> matrix(unknowns, unknowns);
-    matrix.reserve(unknowns + static_cast<Eigen::Index>(entries.size() * 2 / 3));
+    matrix.reserve(static_cast<Eigen::Index>(unknowns + entries.size() * 2 / 3));
     std::size_t next = 0;
-    for (Eigen::Index column = 0; column < unknowns; ++column) {
+    for (std::uint32_t column = 0; column < unknowns; ++column) {
       matrix.startVec(column);
-      matrix.insertBack(column, column) = diagonal[static_cast<std::size_t>(column) + 1];
-      while (next < entries.size() && entries[next].column == static_cast<std::uint32_t>(column)) {
+      matrix.insertBack(column, column) = diagonal[column];
+      while (next < entries.size() && entries[next].column == column) {
         const std::uint32_t row = entries[next].row;
         double sum = 0;
-        for (; next < entries.size() && entries[next].column == static_cast<std::uint32_t>(column) && entries[next].row == row; ++next)
+        for (; next < entries.size() && entries[next].column == column && entries[next].row == row; ++next)
           sum += entries[next].weight;
-        matrix.insertBack(static_cast<Eigen::Index>(row), column) = -sum;
+        matrix.insertBack(row, column) = -sum;
       }
     }
     matrix.finalize();
@@ -233,17 +237,19 @@ class RigidRelaxation {
     }
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec2d turned = weight[k] * Vec2d(cosine * e[k].x - sine * e[k].y, sine * e[k].x + cosine * e[k].y);
-      const auto i = static_cast<Eigen::Index>(v[k]) - 1;
-      const auto j = static_cast<Eigen::Index>(v[(k + 1) % 3]) - 1;
-      if (i >= 0) right.row(i) -= Eigen::RowVector2d(turned.x, turned.y);
-      if (j >= 0) right.row(j) += Eigen::RowVector2d(turned.x, turned.y);
+      const std::uint32_t i = v[k];
+      const std::uint32_t j = v[(k + 1) % 3];
+      if (i != fixed_) right.row(row_[i]) -= Eigen::RowVector2d(turned.x, turned.y);
+      if (j != fixed_) right.row(row_[j]) += Eigen::RowVector2d(turned.x, turned.y);
     }
   }
 
   const ChartMesh& chart_;
   std::vector<FlatTriangle> flat_;
   std::vector<double> emphasis_;  // per triangle: multiplies its cotangents
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
+  std::vector<std::uint32_t> row_;  // per point: of the matrix
+  std::uint32_t fixed_ = 0;         // the last row's point, at the origin: it is no unknown
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> solver_;
 };
 
 bool isGood(const ChartMesh& chart, std::span<const Vec2d> uvs, const FlattenOptions& options) {
