@@ -124,8 +124,9 @@ class Unwrapper {
 
 }  // namespace
 
-Unwrapped unwrap(const TriangleSoup& soup, const UnwrapOptions& options) {
+Unwrapped unwrap(TriangleSoup&& soup, const UnwrapOptions& options) {
   const HalfEdgeMesh mesh = buildHalfEdgeMesh(soup);
+  soup = {};
   GrowOptions growOptions;
   growOptions.largestSide = options.largestSide;
   const MergeTree tree = growCharts(mesh, growOptions);
