@@ -60,6 +60,7 @@ class Grower {
 
   MergeTree grow() {
     tree_.triangleCount = mesh_.size();
+    tree_.merges.reserve(mesh_.size());
     makeRegions();
     makeBorders();
     while (!queue_.empty()) {
@@ -217,6 +218,7 @@ std::vector<std::uint32_t> MergeTree::trianglesBelow(std::uint32_t node) const {
     open.insert(open.end(), children(top).begin(), children(top).end());
   }
   std::sort(found.begin(), found.end());
+  found.shrink_to_fit();
   return found;
 }
 

@@ -67,6 +67,7 @@ void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart) {
     }
     chart.triangles[i / 3][i % 3] = vertexOf[root];
   }
+  chart.points.shrink_to_fit();
 }
 
 FlatTriangle layFlat(const std::array<Vec3d, 3>& corners) {

@@ -115,18 +115,18 @@ std::vector<Vec2d> unroll(const ChartMesh& chart) {
 /// Local/global iterations: rotations per triangle, then one solve with a matrix that is factored once.
 class RigidRelaxation {
  public:
-  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), flat_(chart.triangles.size()), emphasis_(chart.triangles.size(), 1.0), row_(chart.points.size()) {
+  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), row_(chart.points.size()) {
     const std::vector<std::uint32_t> order = nestedDissection(chart.points, chart.triangles);
     for (std::uint32_t i = 0; i < order.size(); ++i) row_[order[i]] = i;
     fixed_ = order.back();
-    for (std::size_t t = 0; t < flat_.size(); ++t) flat_[t] = layFlat(chart, t);
     solver_.compute(laplacian());
   }
 
   /// Iteratively reweighted towards a fourth power of the error: triangles beyond `limit` pull harder, so that the
   /// distortion spreads from where it is worst.
   void emphasiseWorst(const std::vector<Vec2d>& uvs, double limit) {
-    for (std::size_t t = 0; t < flat_.size(); ++t) {
+    emphasis_.resize(chart_.triangles.size(), 1.0);
+    for (std::size_t t = 0; t < emphasis_.size(); ++t) {
       const double excess = (worstStretch(t, uvs) - 1) / (limit - 1);
       constexpr double kLeast = 0.1, kMost = 4.0;
       const double wanted = std::clamp(excess, kLeast, kMost);
@@ -140,7 +140,7 @@ class RigidRelaxation {
   /// One iteration; returns how far points moved, root mean square, or a negative number if the solve failed.
   double step(std::vector<Vec2d>& uvs) const {
     Eigen::MatrixX2d right = Eigen::MatrixX2d::Zero(static_cast<Eigen::Index>(uvs.size()) - 1, 2);
-    for (std::size_t t = 0; t < flat_.size(); ++t) addTriangle(t, uvs, right);
+    for (std::size_t t = 0; t < chart_.triangles.size(); ++t) addTriangle(t, uvs, right);
     const Eigen::MatrixX2d solved = solver_.solve(right);
     if (!solved.allFinite()) return -1;
     double moved = 0;
@@ -157,25 +157,26 @@ class RigidRelaxation {
 
  private:
   struct Entry {
-    std::uint32_t column, row;  // row > column: the lower triangle
+    std::uint32_t column, row;  // row < column: the upper triangle
     double weight;
     bool operator<(const Entry& other) const { return column != other.column ? column < other.column : row < other.row; }
   };
 
-  /// Cotangent Laplacian without the fixed point, lower triangle; assembled in place, at 16 bytes per triangle side.
+  /// Cotangent Laplacian without the fixed point, upper triangle (what Eigen reads without a copy); assembled in place,
+  /// at 16 bytes per triangle side.
   Eigen::SparseMatrix<double> laplacian() const {
     const auto unknowns = static_cast<std::uint32_t>(chart_.points.size() - 1);  // the last point stays at the origin
     std::vector<double> diagonal(chart_.points.size(), 0.0);
     std::vector<Entry> entries;
-    entries.reserve(3 * flat_.size());
-    for (std::size_t t = 0; t < flat_.size(); ++t) {
-      const std::array<double, 3> weight = cotangents(t);
+    entries.reserve(3 * chart_.triangles.size());
+    for (std::size_t t = 0; t < chart_.triangles.size(); ++t) {
+      const std::array<double, 3> weight = cotangents(t, layFlat(chart_, t));
       for (std::size_t k = 0; k < 3; ++k) {
         const std::uint32_t i = row_[chart_.triangles[t][k]];
         const std::uint32_t j = row_[chart_.triangles[t][(k + 1) % 3]];
         diagonal[i] += weight[k];
         diagonal[j] += weight[k];
-        if (i < unknowns && j < unknowns) entries.push_back({std::min(i, j), std::max(i, j), weight[k]});
+        if (i < unknowns && j < unknowns) entries.push_back({std::max(i, j), std::min(i, j), weight[k]});
       }
     }
     std::sort(entries.begin(), entries.end());
@@ -184,7 +185,6 @@ class RigidRelaxation {
     std::size_t next = 0;
     for (std::uint32_t column = 0; column < unknowns; ++column) {
       matrix.startVec(column);
-      matrix.insertBack(column, column) = diagonal[column];
       while (next < entries.size() && entries[next].column == column) {
         const std::uint32_t row = entries[next].row;
         double sum = 0;
@@ -192,6 +192,7 @@ class RigidRelaxation {
           sum += entries[next].weight;
         matrix.insertBack(row, column) = -sum;
       }
+      matrix.insertBack(column, column) = diagonal[column];
     }
     matrix.finalize();
     return matrix;
@@ -200,7 +201,7 @@ class RigidRelaxation {
   /// The larger of the greatest singular value and the inverse of the least; very large where turned over.
   double worstStretch(std::size_t t, const std::vector<Vec2d>& uvs) const {
     const auto& v = chart_.triangles[t];
-    const SingularValues s = singularValues(flat_[t], {uvs[v[0]], uvs[v[1]], uvs[v[2]]});
+    const SingularValues s = singularValues(layFlat(chart_, t), {uvs[v[0]], uvs[v[1]], uvs[v[2]]});
     return s.small > 0 ? std::max(s.big, 1 / s.small) : 1e3;
   }
 
@@ -209,18 +210,18 @@ class RigidRelaxation {
   }
 
   /// Of the angle opposite each edge (k, k + 1).
-  std::array<double, 3> cotangents(std::size_t t) const {
-    const FlatTriangle& f = flat_[t];
-    const std::array<Vec2d, 3> e = edges(f);
-    const double area2 = f.x1 * f.y2;
+  std::array<double, 3> cotangents(std::size_t t, const FlatTriangle& flat) const {
+    const std::array<Vec2d, 3> e = edges(flat);
+    const double factor = (emphasis_.empty() ? 1.0 : emphasis_[t]) / (flat.x1 * flat.y2);
     std::array<double, 3> cot;
-    for (std::size_t k = 0; k < 3; ++k) cot[k] = -emphasis_[t] * glm::dot(e[(k + 1) % 3], e[(k + 2) % 3]) / area2;
+    for (std::size_t k = 0; k < 3; ++k) cot[k] = -factor * glm::dot(e[(k + 1) % 3], e[(k + 2) % 3]);
     return cot;
   }
 
   void addTriangle(std::size_t t, const std::vector<Vec2d>& uvs, Eigen::MatrixX2d& right) const {
-    const std::array<Vec2d, 3> e = edges(flat_[t]);
-    const std::array<double, 3> weight = cotangents(t);
+    const FlatTriangle flat = layFlat(chart_, t);
+    const std::array<Vec2d, 3> e = edges(flat);
+    const std::array<double, 3> weight = cotangents(t, flat);
     const auto& v = chart_.triangles[t];
     double cosine = 0, sine = 0;  // of the rotation that fits best, not yet normalised
     for (std::size_t k = 0; k < 3; ++k) {
@@ -245,11 +246,10 @@ class RigidRelaxation {
   }
 
   const ChartMesh& chart_;
-  std::vector<FlatTriangle> flat_;
-  std::vector<double> emphasis_;  // per triangle: multiplies its cotangents
+  std::vector<double> emphasis_;    // per triangle: multiplies its cotangents; empty: 1
   std::vector<std::uint32_t> row_;  // per point: of the matrix
   std::uint32_t fixed_ = 0;         // the last row's point, at the origin: it is no unknown
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> solver_;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>> solver_;
 };
 
 bool isGood(const ChartMesh& chart, std::span<const Vec2d> uvs, const FlattenOptions& options) {

@@ -7,7 +7,7 @@
 namespace lumel {
 namespace {
 
-constexpr std::size_t kLeafPoints = 8;  // so few fill up in any order
+constexpr std::size_t kLeafPoints = 3;  // so few fill up in any order
 
 class Dissection {
  public:
