@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "lightmap/chart_cut.h"
 #include "lightmap/chart_growing.h"
 #include "lightmap/chart_merging.h"
 #include "lightmap/flatten.h"
@@ -82,6 +83,9 @@ class Unwrapper {
  private:
   bool tryFlatten(std::vector<std::uint32_t> triangles, FlatChart& chart) const {
     chart.mesh = makeChartMesh(mesh_, std::move(triangles));
+    const ChartForm form = formOf(chart.mesh);
+    if (form == ChartForm::Closed) return false;
+    if (form == ChartForm::Band) cutBand(mesh_, chart.mesh);
     Flattening flat = flatten(chart.mesh, {options_.maxStretch, options_.largestSide});
     chart.uvs = std::move(flat.uvs);
     return flat.valid;

@@ -141,6 +141,11 @@ TEST(Charts, CubeHasAtMostSix) {
   EXPECT_LE(expectSound(box(Vec3(0), Vec3(1)), 50).charts, 6u);
 }
 
+TEST(Charts, BoardOfOneTexelHasTwo) {
+  // Each of its narrow sides lies beside the top or the bottom: alone it would be all gutter.
+  EXPECT_EQ(expectSound(box(Vec3(0), Vec3(3, 2, 0.05f)), 20).charts, 2u);
+}
+
 TEST(Charts, OneTriangle) {
   Shape s;
   s.positions = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}};
