@@ -72,41 +72,48 @@ std::uint32_t innermostTriangle(const ChartMesh& chart) {
   return queue.back();
 }
 
+/// Directions of the triangle's edges (k, k + 1), as layFlat has it.
+std::array<Vec2d, 3> edges(const FlatTriangle& f) {
+  return {Vec2d(f.x1, 0), Vec2d(f.x2 - f.x1, f.y2), Vec2d(-f.x2, -f.y2)};
+}
+
+/// As complex numbers.
+Vec2d times(Vec2d a, Vec2d b) { return {a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x}; }
+Vec2d conjugate(Vec2d a) { return {a.x, -a.y}; }
+
 /// Lays triangle after triangle beside one that lies already, breadth first: exact where the chart is developable.
+/// How each one is turned follows from its neighbour's turn and the angles between their edges. Read off the places of
+/// points instead, rounding errors would grow by a factor with every triangle.
 std::vector<Vec2d> unroll(const ChartMesh& chart) {
   std::vector<Vec2d> uvs(chart.points.size(), Vec2d(0.0));
   std::vector<std::uint8_t> placed(chart.points.size(), 0);
-  std::vector<bool> seen(chart.triangles.size(), false);
+  std::vector<Vec2d> turn(chart.triangles.size(), Vec2d(0.0));  // of layFlat's x axis; 0: not yet laid
   const std::uint32_t first = innermostTriangle(chart);
+  turn[first] = Vec2d(1, 0);
   const FlatTriangle flat = layFlat(chart, first);
-  const auto& v = chart.triangles[first];
-  uvs[v[1]] = {flat.x1, 0};
-  uvs[v[2]] = {flat.x2, flat.y2};
-  for (const std::uint32_t i : v) placed[i] = 1;
+  uvs[chart.triangles[first][1]] = {flat.x1, 0};
+  uvs[chart.triangles[first][2]] = {flat.x2, flat.y2};
+  for (const std::uint32_t i : chart.triangles[first]) placed[i] = 1;
   std::vector<std::uint32_t> queue = {first};
-  seen[first] = true;
   for (std::size_t head = 0; head < queue.size(); ++head) {
     const std::uint32_t t = queue[head];
+    const std::array<Vec2d, 3> sides = edges(layFlat(chart, t));
     for (std::size_t k = 0; k < 3; ++k) {
       const std::int32_t n = chart.neighbours[t][k];
-      if (n < 0 || seen[static_cast<std::size_t>(n)]) continue;
+      if (n < 0 || turn[static_cast<std::size_t>(n)] != Vec2d(0.0)) continue;
       const auto u = static_cast<std::uint32_t>(n);
-      seen[u] = true;
       queue.push_back(u);
-      const std::uint32_t a = chart.triangles[t][(k + 1) % 3];  // the edge as the neighbour runs it: a to b
-      const std::uint32_t b = chart.triangles[t][k];
-      std::uint32_t c = 0;
-      for (const std::uint32_t i : chart.triangles[u])
-        if (i != a && i != b) c = i;
-      if (placed[c]) continue;
-      placed[c] = 1;
-      const Vec3d edge = chart.points[b] - chart.points[a];
-      const Vec3d arm = chart.points[c] - chart.points[a];
-      const double length2 = glm::dot(edge, edge);
-      const double along = glm::dot(arm, edge) / length2;
-      const double above = glm::length(glm::cross(edge, arm)) / length2;
-      const Vec2d e = uvs[b] - uvs[a];
-      uvs[c] = uvs[a] + along * e + above * Vec2d(-e.y, e.x);
+      const auto& v = chart.triangles[u];
+      const std::uint32_t from = chart.triangles[t][(k + 1) % 3];  // the edge as the neighbour runs it
+      const std::uint32_t to = chart.triangles[t][k];
+      std::size_t j = 0;
+      while (j < 2 && !(v[j] == from && v[(j + 1) % 3] == to)) ++j;
+      const std::array<Vec2d, 3> theirs = edges(layFlat(chart, u));
+      turn[u] = glm::normalize(times(times(-sides[k], turn[t]), conjugate(theirs[j])));
+      const std::uint32_t apex = v[(j + 2) % 3];
+      if (placed[apex]) continue;
+      placed[apex] = 1;
+      uvs[apex] = uvs[from] - times(theirs[(j + 2) % 3], turn[u]);
     }
   }
   return uvs;
@@ -203,10 +210,6 @@ class RigidRelaxation {
     const auto& v = chart_.triangles[t];
     const SingularValues s = singularValues(layFlat(chart_, t), {uvs[v[0]], uvs[v[1]], uvs[v[2]]});
     return s.small > 0 ? std::max(s.big, 1 / s.small) : 1e3;
-  }
-
-  static std::array<Vec2d, 3> edges(const FlatTriangle& f) {
-    return {Vec2d(f.x1, 0), Vec2d(f.x2 - f.x1, f.y2), Vec2d(-f.x2, -f.y2)};
   }
 
   /// Of the angle opposite each edge (k, k + 1).
