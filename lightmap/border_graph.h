@@ -3,10 +3,18 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
 namespace lumel {
+
+/// A cost rounded to 2^-18, so that what is alike but for rounding is taken in the order of its number, whatever the
+/// unit of length or a small edit elsewhere made of the last bits.
+inline double withoutNoise(double cost) {
+  constexpr double kSteps = 1 << 18;
+  return std::round(cost * kSteps) / kSteps;
+}
 
 /// Each pair of regions has at most one border. `Border` holds what is known of it; `kept.absorb(dropped)` adds up two
 /// that become one when a region they share an end with takes in the region at the other end of one of them.

@@ -143,7 +143,7 @@ class Grower {
     if (bend > slack) return kNever;
     const double perimeter = a.perimeter + b.perimeter - 2 * length;
     const double roundness = perimeter * perimeter / (4 * std::numbers::pi * area);
-    return bend + crease + kShapeWeight * roundness;
+    return withoutNoise(bend + crease + kShapeWeight * roundness);
   }
 
   void merge(std::uint32_t border) {

@@ -110,7 +110,7 @@ class PartMerger {
     const ChartSheet::Chart& smaller = a.normals.area < b.normals.area ? a : b;
     const double crease = border.crease / border.length;
     if (crease > creaseLimit(smaller.normals.area, smaller.perimeter)) return kNever;
-    return crease + 0.5 * std::max(0.0, 1 - 2 * border.length / smaller.perimeter);
+    return withoutNoise(crease + 0.5 * std::max(0.0, 1 - 2 * border.length / smaller.perimeter));
   }
 
   void tryMerge(std::uint32_t index) {
