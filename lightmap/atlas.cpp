@@ -10,6 +10,7 @@
 #include "lightmap/object_layouts.h"
 #include "lightmap/scene_charts.h"
 #include "lightmap/scene_uvs.h"
+#include "lightmap/uv_rounding.h"
 #include "scene/parallel.h"
 
 namespace lumel {
@@ -180,16 +181,19 @@ class AtlasBuilder {
         atlas.charts.push_back({-1, atlas.texelsPerMeter * instance.settings.texelDensityScale * static_cast<float>(snap), key,
                                 place.quarterTurns, place.x, place.y});
         if (place.kept) ++result_.report.keptCharts;
-        const auto& size = places.pages[static_cast<std::size_t>(place.page)];
+        const auto& page = places.pages[static_cast<std::size_t>(place.page)];
+        const Vec2d size(page[0], page[1]);
+        std::vector<Vec2> uvs;
+        for (const Vec2 uv : chart.uvs) uvs.push_back(Vec2(place.apply(uv) / size));
+        keepAreasAfterRounding(uvs, chart.corners, size);
         for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
           const SourceTriangle& source = layout.source[chart.triangles[t]];
           PlacedTriangle triangle{source.primitive, source.triangle, firstPage + place.page, index, {}};
           std::array<Vec2d, 3> corners;
           for (std::size_t k = 0; k < 3; ++k) {
-            const Vec2d texel = place.apply(chart.uvs[chart.corners[t][k]]);
             const std::size_t corner = mirrors && k > 0 ? 3 - k : k;  // the soup was reversed
-            triangle.uvs[corner] = Vec2(texel / Vec2d(size[0], size[1]));
-            corners[k] = texel;
+            triangle.uvs[corner] = uvs[chart.corners[t][k]];
+            corners[k] = Vec2d(triangle.uvs[corner]) * size;
           }
           const Vec2d e1 = corners[1] - corners[0];
           const Vec2d e2 = corners[2] - corners[0];

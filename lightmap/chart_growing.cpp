@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <queue>
-#include <unordered_map>
 
+#include "lightmap/border_graph.h"
 #include "lightmap/chart_mesh.h"
 
 namespace lumel {
@@ -18,17 +18,18 @@ constexpr double kShapeWeight = 0.002;    // against ragged borders: only decide
 struct Region {
   NormalMoments normals;
   double perimeter = 0.0;
-  Vec3d low{0.0}, high{0.0};
+  Vec3 low{0.0f}, high{0.0f};
   std::uint32_t node = 0;
-  std::vector<std::uint32_t> borders;
-  bool alive = true;
 };
 
 struct Border {
-  std::uint32_t a = 0, b = 0;  // regions, a < b at creation
-  double length = 0.0;
-  double crease = 0.0;  // length * (1 - cos of the bend)
-  bool alive = true;
+  float length = 0.0f;
+  float crease = 0.0f;  // length * (1 - cos of the bend)
+
+  void absorb(const Border& other) {
+    length += other.length;
+    crease += other.crease;
+  }
 };
 
 struct Candidate {
@@ -55,19 +56,19 @@ double smallestEigenvalue(const std::array<double, 6>& m) {
 
 class Grower {
  public:
-  Grower(const HalfEdgeMesh& mesh, const GrowOptions& options) : mesh_(mesh), options_(options) {}
+  Grower(const HalfEdgeMesh& mesh, const GrowOptions& options) : mesh_(mesh), options_(options), borders_(mesh.size()) {}
 
   MergeTree grow() {
     tree_.triangleCount = mesh_.size();
+    tree_.merges.reserve(mesh_.size());
     makeRegions();
     makeBorders();
     while (!queue_.empty()) {
       const Candidate top = queue_.top();
       queue_.pop();
-      const Border& border = borders_[top.border];
-      if (!border.alive) continue;
+      if (!borders_.isAlive(top.border)) continue;
       // Costs are brought up to date only when they come up: a region's growth rarely makes a merge cheaper.
-      const double now = cost(border);
+      const double now = cost(top.border);
       if (now > top.cost * 1.0001 + 1e-9) {
         if (std::isfinite(now)) queue_.push({static_cast<float>(now), top.border});
         continue;
@@ -95,101 +96,71 @@ class Grower {
       Region& r = regions_[t];
       r.normals = NormalMoments(areaNormal(mesh_, t));
       const auto& v = mesh_.triangles[t];
-      r.low = glm::min(mesh_.points[v[0]], glm::min(mesh_.points[v[1]], mesh_.points[v[2]]));
-      r.high = glm::max(mesh_.points[v[0]], glm::max(mesh_.points[v[1]], mesh_.points[v[2]]));
+      r.low = Vec3(glm::min(mesh_.points[v[0]], glm::min(mesh_.points[v[1]], mesh_.points[v[2]])));
+      r.high = Vec3(glm::max(mesh_.points[v[0]], glm::max(mesh_.points[v[1]], mesh_.points[v[2]])));
       for (std::size_t k = 0; k < 3; ++k)
         r.perimeter += glm::length(mesh_.points[v[(k + 1) % 3]] - mesh_.points[v[k]]);
       r.node = t;
     }
   }
 
-  static std::uint64_t key(std::uint32_t a, std::uint32_t b) {
-    return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
-  }
-
   void makeBorders() {
-    borderOf_.reserve(mesh_.size() * 3 / 2);
     for (std::uint32_t t = 0; t < mesh_.size(); ++t) {
       for (std::size_t k = 0; k < 3; ++k) {
         const std::int32_t other = mesh_.neighbours[t][k];
         if (other <= static_cast<std::int32_t>(t)) continue;
         const auto u = static_cast<std::uint32_t>(other);
-        const auto [place, isNew] = borderOf_.try_emplace(key(t, u), static_cast<std::uint32_t>(borders_.size()));
-        if (isNew) {
-          borders_.push_back({t, u, 0, 0, true});
-          regions_[t].borders.push_back(place->second);
-          regions_[u].borders.push_back(place->second);
-        }
-        Border& border = borders_[place->second];
+        Border& border = borders_[borders_.between(t, u)];
         const double length = glm::length(mesh_.points[mesh_.triangles[t][(k + 1) % 3]] - mesh_.points[mesh_.triangles[t][k]]);
         const NormalMoments& a = regions_[t].normals;
         const NormalMoments& b = regions_[u].normals;
         const double bend = 1 - glm::dot(a.sum, b.sum) / (a.area * b.area);
         const double weight = (mesh_.hard[t][k] ? 1.0 : kSmoothCrease) * std::min(thinness(t), thinness(u));
-        border.length += length;
-        border.crease += length * weight * std::max(0.0, bend);
+        border.absorb({static_cast<float>(length), static_cast<float>(length * weight * std::max(0.0, bend))});
       }
     }
     std::vector<Candidate> first;
     first.reserve(borders_.size());
     for (std::uint32_t i = 0; i < borders_.size(); ++i)
-      if (const double c = cost(borders_[i]); std::isfinite(c)) first.push_back({static_cast<float>(c), i});
+      if (const double c = cost(i); std::isfinite(c)) first.push_back({static_cast<float>(c), i});
     queue_ = std::priority_queue<Candidate>(std::less<Candidate>(), std::move(first));
   }
 
   /// Infinite where the merge is out of the question.
-  double cost(const Border& border) const {
-    const Region& a = regions_[border.a];
-    const Region& b = regions_[border.b];
-    const Vec3d extent = glm::max(a.high, b.high) - glm::min(a.low, b.low);
+  double cost(std::uint32_t index) const {
+    const Border& border = borders_[index];
+    const Region& a = regions_[borders_.ends(index)[0]];
+    const Region& b = regions_[borders_.ends(index)[1]];
+    const Vec3 extent = glm::max(a.high, b.high) - glm::min(a.low, b.low);
     constexpr double kNever = std::numeric_limits<double>::infinity();
-    if (std::max({extent.x, extent.y, extent.z}) > options_.largestSide) return kNever;
+    if (static_cast<double>(std::max({extent.x, extent.y, extent.z})) > options_.largestSide) return kNever;
     const double area = a.normals.area + b.normals.area;
     const double slack = smallChartSlack(area);
-    const double crease = border.crease / border.length;
+    const double length = static_cast<double>(border.length);
+    const double crease = static_cast<double>(border.crease) / length;
     if (crease > std::min(kMostCrease, (1 - options_.maxCreaseCosine) * slack)) return kNever;
     const double bend = NormalMoments(a.normals, b.normals).coneVariance() / options_.maxConeVariance;
     if (bend > slack) return kNever;
-    const double perimeter = a.perimeter + b.perimeter - 2 * border.length;
+    const double perimeter = a.perimeter + b.perimeter - 2 * length;
     const double roundness = perimeter * perimeter / (4 * std::numbers::pi * area);
-    return bend + crease + kShapeWeight * roundness;
+    return withoutNoise(bend + crease + kShapeWeight * roundness);
   }
 
-  void merge(std::uint32_t borderIndex) {
-    std::uint32_t keep = borders_[borderIndex].a;
-    std::uint32_t drop = borders_[borderIndex].b;
-    if (regions_[keep].borders.size() < regions_[drop].borders.size()) std::swap(keep, drop);
+  void merge(std::uint32_t border) {
+    auto [keep, drop] = borders_.ends(border);
+    if (borders_.degree(keep) < borders_.degree(drop)) std::swap(keep, drop);
     Region& into = regions_[keep];
-    Region& from = regions_[drop];
-    into.perimeter += from.perimeter - 2 * borders_[borderIndex].length;
+    const Region& from = regions_[drop];
+    into.perimeter += from.perimeter - 2 * static_cast<double>(borders_[border].length);
     into.normals = NormalMoments(into.normals, from.normals);
     into.low = glm::min(into.low, from.low);
     into.high = glm::max(into.high, from.high);
     tree_.merges.push_back({into.node, from.node});
     into.node = static_cast<std::uint32_t>(tree_.triangleCount + tree_.merges.size() - 1);
-    from.alive = false;
-    borders_[borderIndex].alive = false;
-    for (const std::uint32_t moved : from.borders) moveBorder(moved, drop, keep);
-    from.borders = {};
-  }
-
-  void moveBorder(std::uint32_t moved, std::uint32_t from, std::uint32_t to) {
-    Border& border = borders_[moved];
-    if (!border.alive) return;
-    const std::uint32_t other = border.a == from ? border.b : border.a;
-    const auto [place, isNew] = borderOf_.try_emplace(key(to, other), moved);
-    if (isNew) {
-      border.a = to;
-      border.b = other;
-      regions_[to].borders.push_back(moved);
-      return;
-    }
-    Border& kept = borders_[place->second];
-    kept.length += border.length;
-    kept.crease += border.crease;
-    border.alive = false;
-    // The longer common border may be a better reason to merge than either part was.
-    if (const double c = cost(kept); std::isfinite(c)) queue_.push({static_cast<float>(c), place->second});
+    borders_.merge(drop, keep, [this](std::uint32_t grown) {
+      // The longer common border may be a better reason to merge than either part was.
+      if (const double c = cost(grown); std::isfinite(c)) queue_.push({static_cast<float>(c), grown});
+    });
   }
 
   void collectRoots() {
@@ -210,8 +181,7 @@ class Grower {
   const HalfEdgeMesh& mesh_;
   const GrowOptions& options_;
   std::vector<Region> regions_;
-  std::vector<Border> borders_;
-  std::unordered_map<std::uint64_t, std::uint32_t> borderOf_;  // looked up only; keys of merged regions are left behind
+  BorderGraph<Border> borders_;
   std::priority_queue<Candidate> queue_;
   MergeTree tree_;
 };
@@ -248,6 +218,7 @@ std::vector<std::uint32_t> MergeTree::trianglesBelow(std::uint32_t node) const {
     open.insert(open.end(), children(top).begin(), children(top).end());
   }
   std::sort(found.begin(), found.end());
+  found.shrink_to_fit();
   return found;
 }
 

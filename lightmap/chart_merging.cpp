@@ -6,6 +6,7 @@
 #include <numeric>
 #include <queue>
 
+#include "lightmap/border_graph.h"
 #include "lightmap/chart_growing.h"
 #include "lightmap/chart_sheet.h"
 #include "lightmap/flatten.h"
@@ -15,14 +16,20 @@ namespace lumel {
 namespace {
 
 constexpr double kSmoothCrease = 0.25;  // weight of a crease that is shaded smooth
+constexpr double kTinyTexels = 4.0;     // charts of less area should find a neighbour if any way can be found
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 struct Border {
-  std::uint32_t a = 0, b = 0;
   std::vector<MeshEdge> edges;  // from the side of either chart
   double length = 0, crease = 0;
   double refusedArea = 0;  // of both charts together when flattening them as one failed
-  bool alive = true;
+
+  void absorb(Border& other) {
+    edges.insert(edges.end(), other.edges.begin(), other.edges.end());
+    length += other.length;
+    crease += other.crease;
+    other.edges = {};
+  }
 };
 
 struct Candidate {
@@ -37,23 +44,25 @@ struct Candidate {
 /// light had better share texels than be alone in a texel with a gutter around it.
 double creaseLimit(double area, double perimeter) {
   const double width = 2 * area / perimeter;
-  if (area < 4 || width < 0.75) return 1.2;   // just over a right angle
-  if (area < 16 || width < 1.5) return 0.75;  // 75 degrees
+  if (area < kTinyTexels || width < 0.75) return 1.2;   // just over a right angle
+  if (width < 1.5) return 1.05;
+  if (area < 16) return 0.75;  // 75 degrees
   return 0.5;                                 // 60 degrees
 }
 
 class PartMerger {
  public:
-  PartMerger(const HalfEdgeMesh& mesh, std::vector<FlatChart*> charts, const std::vector<std::uint32_t>& localTriangle, const MergeOptions& options)
-      : mesh_(mesh), options_(options), charts_(std::move(charts)), sheet_(mesh, charts_, localTriangle) {}
+  PartMerger(const HalfEdgeMesh& mesh, std::vector<FlatChart*> charts, const std::vector<std::uint32_t>& localTriangle,
+              const std::vector<FrameBreak>& breaks, const MergeOptions& options)
+      : mesh_(mesh), options_(options), charts_(std::move(charts)), sheet_(mesh, charts_, localTriangle, breaks), borders_(charts_.size()) {}
 
   std::vector<FlatChart> run() {
     makeBorders();
     while (!queue_.empty()) {
       const Candidate top = queue_.top();
       queue_.pop();
-      if (!borders_[top.border].alive) continue;
-      const double now = cost(borders_[top.border]);
+      if (!borders_.isAlive(top.border)) continue;
+      const double now = cost(top.border);
       if (now > top.cost * 1.0001 + 1e-9) {
         if (std::isfinite(now)) queue_.push({static_cast<float>(now), top.border});
         continue;
@@ -64,12 +73,7 @@ class PartMerger {
   }
 
  private:
-  static std::uint64_t key(std::uint32_t a, std::uint32_t b) {
-    return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
-  }
-
   void makeBorders() {
-    bordersOf_.resize(charts_.size());
     members_.resize(charts_.size());
     for (std::uint32_t c = 0; c < charts_.size(); ++c) {
       members_[c] = {c};
@@ -85,13 +89,7 @@ class PartMerger {
     const auto other = static_cast<std::uint32_t>(mesh_.neighbours[edge.triangle][edge.k]);
     const std::uint32_t d = sheet_.chartOf(other);
     if (d <= c) return;  // a cut inside a chart, or met from the other side
-    const auto [place, isNew] = borderOf_.try_emplace(key(c, d), static_cast<std::uint32_t>(borders_.size()));
-    if (isNew) {
-      borders_.push_back({c, d, {}, 0, 0, 0, true});
-      bordersOf_[c].push_back(place->second);
-      bordersOf_[d].push_back(place->second);
-    }
-    Border& border = borders_[place->second];
+    Border& border = borders_[borders_.between(c, d)];
     border.edges.push_back(edge);
     const Vec3d n = areaNormal(mesh_, edge.triangle);
     const Vec3d m = areaNormal(mesh_, other);
@@ -102,45 +100,48 @@ class PartMerger {
   }
 
   void push(std::uint32_t border) {
-    if (const double c = cost(borders_[border]); std::isfinite(c)) queue_.push({static_cast<float>(c), border});
+    if (const double c = cost(border); std::isfinite(c)) queue_.push({static_cast<float>(c), border});
   }
 
-  double cost(const Border& border) const {
-    const ChartSheet::Chart& a = sheet_.chart(border.a);
-    const ChartSheet::Chart& b = sheet_.chart(border.b);
+  double cost(std::uint32_t index) const {
+    const Border& border = borders_[index];
+    const ChartSheet::Chart& a = sheet_.chart(borders_.ends(index)[0]);
+    const ChartSheet::Chart& b = sheet_.chart(borders_.ends(index)[1]);
     const ChartSheet::Chart& smaller = a.normals.area < b.normals.area ? a : b;
     const double crease = border.crease / border.length;
     if (crease > creaseLimit(smaller.normals.area, smaller.perimeter)) return kNever;
-    return crease + 0.5 * std::max(0.0, 1 - 2 * border.length / smaller.perimeter);
+    return withoutNoise(crease + 0.5 * std::max(0.0, 1 - 2 * border.length / smaller.perimeter));
   }
 
   void tryMerge(std::uint32_t index) {
     Border& border = borders_[index];
-    std::uint32_t into = border.a;
-    std::uint32_t from = border.b;
+    auto [into, from] = borders_.ends(index);
     if (sheet_.chart(into).triangles.size() < sheet_.chart(from).triangles.size()) std::swap(into, from);
     std::vector<MeshEdge> shared;
     for (const MeshEdge edge : border.edges) shared.push_back(sheet_.chartOf(edge.triangle) == into ? edge : sheet_.beyond(edge));
-    if (moveTo(border, into, from, shared) || flattenAsOne(border, into, from, shared)) merged(index, into, from);
+    // A long common border first; what meets by little of it only where no flattening of both does better.
+    constexpr double kMuch = 0.25, kLittle = 0.12;  // of the border: half a pipe meets the other half along one of two
+    if (moveTo(border, into, from, shared, kMuch) || flattenAsOne(border, into, from, shared) || moveTo(border, into, from, shared, kLittle))
+      merged(into, from);
   }
 
-  /// Joins the charts as they are, by a rigid motion.
-  bool moveTo(const Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared) {
-    RigidMotion motion;
-    std::vector<MeshEdge> matched;
-    if (!sheet_.fit(shared, smallChartSlack(sheet_.chart(from).normals.area), motion, matched)) return false;
-    double matchedLength = 0;
-    for (const MeshEdge edge : matched) matchedLength += sheet_.length(edge);
-    constexpr double kLeastMatch = 0.25;  // of the common border: half a pipe meets the other half along one of two
-    if (matchedLength < kLeastMatch * border.length || !sheet_.mayJoin(into, from, motion, matched, options_)) return false;
-    sheet_.join(into, from, motion, matched);
-    return true;
+  /// Joins the charts as they are, by a rigid motion that lets at least a share of the border meet.
+  bool moveTo(const Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared, double leastMatch) {
+    const double smaller = std::min(sheet_.chart(into).normals.area, sheet_.chart(from).normals.area);
+    for (const Fit& fit : sheet_.fits(shared, smallChartSlack(smaller))) {
+      // What is too small for a chart of its own may hang on by any edge.
+      if (smaller >= kTinyTexels && fit.length < leastMatch * border.length) return false;
+      if (!sheet_.mayJoin(into, from, fit, options_)) continue;
+      sheet_.join(into, from, fit);
+      return true;
+    }
+    return false;
   }
 
   /// Flattens both anew as one chart: for curved surfaces, whose borders do not meet rigidly.
   bool flattenAsOne(Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared) {
     constexpr std::size_t kMostTriangles = 4000;   // keeps the number of flattenings times their cost near linear
-    constexpr double kMostConeVariance = 0.06;     // not worth the attempt
+    constexpr double kMostConeVariance = 0.12;     // not worth the attempt
     constexpr double kLeastBorder = 0.1;           // of the smaller one's perimeter: no chart with a narrow waist
     constexpr double kGrowth = 1.3;                // since the last attempt
     const ChartSheet::Chart& a = sheet_.chart(into);
@@ -155,38 +156,17 @@ class PartMerger {
     Flattening flattened = flatten(flat.mesh, {options_.maxStretch, options_.largestSide});
     if (!flattened.valid) return false;
     flat.uvs = std::move(flattened.uvs);
+    if (sheet_.closesBreak(into, from, flat)) return false;
     sheet_.replace(into, from, flat);
     return true;
   }
 
-  void merged(std::uint32_t index, std::uint32_t into, std::uint32_t from) {
+  void merged(std::uint32_t into, std::uint32_t from) {
     members_[into].insert(members_[into].end(), members_[from].begin(), members_[from].end());
     members_[from].clear();
-    borders_[index].alive = false;
-    for (const std::uint32_t moved : bordersOf_[from]) moveBorder(moved, from, into);
-    bordersOf_[from].clear();
+    borders_.merge(from, into, [](std::uint32_t) {});
     // What was refused may fit the grown chart.
-    for (const std::uint32_t i : bordersOf_[into])
-      if (borders_[i].alive) push(i);
-  }
-
-  void moveBorder(std::uint32_t moved, std::uint32_t from, std::uint32_t to) {
-    Border& border = borders_[moved];
-    if (!border.alive) return;
-    const std::uint32_t other = border.a == from ? border.b : border.a;
-    const auto [place, isNew] = borderOf_.try_emplace(key(to, other), moved);
-    if (isNew) {
-      border.a = to;
-      border.b = other;
-      bordersOf_[to].push_back(moved);
-      return;
-    }
-    Border& kept = borders_[place->second];
-    kept.edges.insert(kept.edges.end(), border.edges.begin(), border.edges.end());
-    kept.length += border.length;
-    kept.crease += border.crease;
-    border.alive = false;
-    border.edges = {};
+    borders_.forEachOf(into, [this](std::uint32_t border) { push(border); });
   }
 
   std::vector<FlatChart> collect() {
@@ -213,10 +193,8 @@ class PartMerger {
   const MergeOptions& options_;
   std::vector<FlatChart*> charts_;
   ChartSheet sheet_;
-  std::vector<Border> borders_;
-  std::vector<std::vector<std::uint32_t>> bordersOf_;  // per chart
+  BorderGraph<Border> borders_;
   std::vector<std::vector<std::uint32_t>> members_;    // per chart: the charts that it is made of
-  std::unordered_map<std::uint64_t, std::uint32_t> borderOf_;  // looked up only; keys of merged charts are left behind
   std::priority_queue<Candidate> queue_;
 };
 
@@ -255,13 +233,18 @@ std::vector<FlatChart> mergeCharts(const HalfEdgeMesh& mesh, std::vector<FlatCha
     parts[part].push_back(&charts[c]);
     for (const std::uint32_t t : charts[c].mesh.meshTriangles) localTriangle[t] = partTriangles[part]++;
   }
+  std::vector<std::vector<FrameBreak>> breaks(parts.size());
+  for (const FrameBreak& edge : mesh.frameBreaks) {
+    const std::uint32_t part = partOf[findRoot(parent, chartOf[edge.cornerA / 3])];
+    if (part == partOf[findRoot(parent, chartOf[edge.cornerB / 3])]) breaks[part].push_back(edge);
+  }
   std::vector<std::vector<FlatChart>> merged(parts.size());
   parallelFor(parts.size(), 1, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       if (parts[i].size() == 1)
         merged[i].push_back(std::move(*parts[i][0]));
       else
-        merged[i] = PartMerger(mesh, parts[i], localTriangle, options).run();
+        merged[i] = PartMerger(mesh, parts[i], localTriangle, breaks[i], options).run();
     }
   });
   std::vector<FlatChart> result;

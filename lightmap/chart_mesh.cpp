@@ -67,14 +67,40 @@ void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart) {
     }
     chart.triangles[i / 3][i % 3] = vertexOf[root];
   }
+  chart.points.shrink_to_fit();
+}
+
+FlatTriangle layFlat(const std::array<Vec3d, 3>& corners) {
+  const Vec3d a = corners[1] - corners[0];
+  const Vec3d b = corners[2] - corners[0];
+  const double length = glm::length(a);
+  return {length, glm::dot(a, b) / length, glm::length(glm::cross(a, b)) / length};
 }
 
 FlatTriangle layFlat(const ChartMesh& chart, std::size_t triangle) {
   const auto& v = chart.triangles[triangle];
-  const Vec3d a = chart.points[v[1]] - chart.points[v[0]];
-  const Vec3d b = chart.points[v[2]] - chart.points[v[0]];
-  const double length = glm::length(a);
-  return {length, glm::dot(a, b) / length, glm::length(glm::cross(a, b)) / length};
+  return layFlat({chart.points[v[0]], chart.points[v[1]], chart.points[v[2]]});
+}
+
+double shortestHeight(const FlatTriangle& f) {
+  return f.x1 * f.y2 / std::max({f.x1, std::hypot(f.x2, f.y2), std::hypot(f.x2 - f.x1, f.y2)});
+}
+
+bool isFlipped(const std::array<Vec2d, 3>& uv) {
+  double longest = 0;
+  for (std::size_t k = 0; k < 3; ++k) longest = std::max(longest, glm::length(uv[(k + 1) % 3] - uv[k]));
+  return !(cornerArea(uv) >= -kFlipTexels * longest);
+}
+
+SingularValues singularValues(const FlatTriangle& surface, const std::array<Vec2d, 3>& uv) {
+  // Jacobian from the surface to the texture: columns for the surface's x and y.
+  const Vec2d jx = (uv[1] - uv[0]) / surface.x1;
+  const Vec2d jy = (uv[2] - uv[0] - jx * surface.x2) / surface.y2;
+  const double trace = glm::dot(jx, jx) + glm::dot(jy, jy);
+  const double det = cross2(jx, jy);
+  const double root = std::sqrt(std::max(0.0, trace * trace - 4 * det * det));
+  const double big = std::sqrt((trace + root) / 2);
+  return {big, big > 0 ? det / big : 0.0};
 }
 
 Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, double limit) {
@@ -83,30 +109,20 @@ Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, doubl
   for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
     const FlatTriangle flat = layFlat(chart, t);
     const auto& v = chart.triangles[t];
-    const Vec2d e1 = uvs[v[1]] - uvs[v[0]];
-    const Vec2d e2 = uvs[v[2]] - uvs[v[0]];
-    const double uvArea = cross2(e1, e2);
+    const std::array<Vec2d, 3> uv = {uvs[v[0]], uvs[v[1]], uvs[v[2]]};
     const double area = flat.x1 * flat.y2;
     total += area;
-    const double longest = std::sqrt(std::max({glm::dot(e1, e1), glm::dot(e2, e2), glm::dot(e2 - e1, e2 - e1)}));
-    if (!(uvArea > 0)) {
-      if (!(uvArea > -kFlipTexels * longest)) ++result.flipped;
+    if (!(cornerArea(uv) > 0)) {
+      if (isFlipped(uv) || shortestHeight(flat) > kThinTexels) ++result.flipped;
       bad += area;
       continue;
     }
-    // Jacobian from the surface to the texture: columns for the surface's x and y.
-    const Vec2d jx = e1 / flat.x1;
-    const Vec2d jy = (e2 - jx * flat.x2) / flat.y2;
-    const double trace = glm::dot(jx, jx) + glm::dot(jy, jy);
-    const double det = cross2(jx, jy);
-    const double root = std::sqrt(std::max(0.0, trace * trace - 4 * det * det));
-    const double big = std::sqrt((trace + root) / 2);
-    const double small = det / big;
-    if (!(big <= limit && small * limit >= 1)) bad += area;
-    squares += area * std::min(0.5 * (1 / (big * big) + 1 / (small * small)), 1e3);
+    const SingularValues values = singularValues(flat, uv);
+    if (!values.within(limit)) bad += area;
+    squares += area * std::min(0.5 * (1 / (values.big * values.big) + 1 / (values.small * values.small)), 1e3);
   }
   result.badShare = bad / total;
-  result.l2 = std::sqrt(squares / std::max(total - bad, 1e-300) * (total - bad) / total);
+  result.l2 = std::sqrt(squares / total);
   return result;
 }
 

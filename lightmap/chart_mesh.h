@@ -29,14 +29,30 @@ void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart);
 struct FlatTriangle {
   double x1 = 0, x2 = 0, y2 = 0;
 };
+FlatTriangle layFlat(const std::array<Vec3d, 3>& corners);
 FlatTriangle layFlat(const ChartMesh& chart, std::size_t triangle);
+double shortestHeight(const FlatTriangle& triangle);
+
+/// Triangles thinner than this (texels) may stand askew or collapse: nothing of them shows.
+inline constexpr double kThinTexels = 0.01;
+
+/// Of the linear map from the surface's triangle to the texture's; `small` is not positive where that is turned over.
+struct SingularValues {
+  double big = 0, small = 0;
+
+  /// Whether no length is changed by more than a factor of `limit`, and nothing is turned over.
+  bool within(double limit) const { return big <= limit && small * limit >= 1; }
+};
+/// Whether a triangle lies turned over by more than a float UV could lose.
+bool isFlipped(const std::array<Vec2d, 3>& uv);
+SingularValues singularValues(const FlatTriangle& surface, const std::array<Vec2d, 3>& uv);
 
 /// Sander, Snyder, Gortler and Hoppe 2001, "Texture Mapping Progressive Meshes": singular values of the map from the
 /// texture to the surface, with a chart scaled to its surface's area.
 struct Stretch {
   double l2 = 0.0;         // root mean square over the surface; 1 is isometric
   double badShare = 0.0;   // share of the surface where a singular value or its inverse exceeds the limit
-  std::size_t flipped = 0; // triangles turned over by more than a float UV could lose
+  std::size_t flipped = 0; // triangles turned over by more than a float UV could lose, or without area though not thin
 };
 double surfaceArea(const ChartMesh& chart);
 Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, double limit);

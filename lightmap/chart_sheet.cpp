@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lightmap/frame_slits.h"
 #include "lightmap/triangle_overlap.h"
 
 namespace lumel {
@@ -11,7 +12,7 @@ namespace {
 constexpr double kOverlapTexels = 2e-3;
 constexpr double kMatchTexels = 0.25;    // how far welding may move a point
 constexpr double kMatchShare = 0.05;     // ... and of the edge's length
-constexpr int kSeeds = 4;                // edges that are tried as the one that matches
+constexpr std::size_t kSeeds = 4;                // edges that are tried as the one that matches
 
 std::uint64_t cellKey(std::int64_t x, std::int64_t y) {
   return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32) | static_cast<std::uint32_t>(y);
@@ -56,7 +57,8 @@ bool matches(const std::array<Vec2d, 4>& e, const RigidMotion& motion, double sl
 
 }  // namespace
 
-ChartSheet::ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& charts, const std::vector<std::uint32_t>& localTriangle)
+ChartSheet::ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& charts, const std::vector<std::uint32_t>& localTriangle,
+                       const std::vector<FrameBreak>& breaks)
     : mesh_(mesh), localTriangle_(localTriangle) {
   std::size_t triangles = 0;
   for (const FlatChart* flat : charts) triangles += flat->mesh.triangles.size();
@@ -78,6 +80,13 @@ ChartSheet::ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& 
     for (const std::uint32_t t : chart.triangles)
       for (std::uint32_t k = 0; k < 3; ++k)
         if (!joined_[localTriangle_[t]][k]) insertBorder(chart, {t, k});
+  for (const FrameBreak& edge : breaks) {
+    const std::uint32_t a = chartOf(edge.cornerA / 3);
+    const std::uint32_t b = chartOf(edge.cornerB / 3);
+    if (a == b) continue;
+    charts_[a].breaks.push_back(edge);
+    charts_[b].breaks.push_back(edge);
+  }
 }
 
 /// Sets a chart from its own mesh; its border is not yet entered in the cells.
@@ -157,7 +166,7 @@ void ChartSheet::insertBorder(Chart& chart, MeshEdge edge) {
   visitCells(a, b, [&](std::uint64_t key) { chart.border[key].push_back(edge); });
 }
 
-bool ChartSheet::fit(const std::vector<MeshEdge>& shared, double slack, RigidMotion& motion, std::vector<MeshEdge>& matched) const {
+std::vector<Fit> ChartSheet::fits(const std::vector<MeshEdge>& shared, double slack) const {
   std::vector<std::array<Vec2d, 4>> edges;  // ends in `into`, then the same ends in `from`
   for (const MeshEdge into : shared) {
     const MeshEdge from = beyond(into);
@@ -170,74 +179,86 @@ bool ChartSheet::fit(const std::vector<MeshEdge>& shared, double slack, RigidMot
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return glm::length(edges[a][1] - edges[a][0]) > glm::length(edges[b][1] - edges[b][0]);
   });
-  for (std::size_t i = 0; i < std::min<std::size_t>(kSeeds, order.size()) && edges.size() > 1; ++i)
-    seeds.push_back({edges[order[i * order.size() / std::min<std::size_t>(kSeeds, order.size())]]});
+  const std::size_t singles = edges.size() > 1 ? std::min<std::size_t>(kSeeds, edges.size()) : 0;
+  for (std::size_t i = 0; i < singles; ++i) seeds.push_back({edges[order[i * order.size() / singles]]});
 
-  double best = 0;
+  std::vector<Fit> found;
   for (const auto& seed : seeds) {
+    Fit best;
     RigidMotion trial = procrustes(seed);
     for (int refinement = 0; refinement < 2; ++refinement) {
       std::vector<std::array<Vec2d, 4>> good;
-      std::vector<MeshEdge> goodEdges;
-      double total = 0;
+      Fit fit{trial, {}, 0};
       for (std::size_t i = 0; i < edges.size(); ++i) {
         if (!matches(edges[i], trial, slack)) continue;
         good.push_back(edges[i]);
-        goodEdges.push_back(shared[i]);
-        total += glm::length(edges[i][1] - edges[i][0]);
+        fit.matched.push_back(shared[i]);
+        fit.length += glm::length(edges[i][1] - edges[i][0]);
       }
       if (good.empty()) break;
-      if (total > best * (1 + 1e-9)) {
-        best = total;
-        matched = std::move(goodEdges);
-        motion = trial;
-      }
+      if (fit.length > best.length * (1 + 1e-9)) best = std::move(fit);
       trial = procrustes(good);
     }
-    if (matched.size() == edges.size()) break;
+    const bool complete = best.matched.size() == edges.size();
+    if (best.length > 0) found.push_back(std::move(best));
+    if (complete) break;
   }
-  return best > 0;
+  std::stable_sort(found.begin(), found.end(), [](const Fit& a, const Fit& b) { return a.length > b.length * (1 + 1e-9); });
+  return found;
 }
 
 bool ChartSheet::staysGood(std::uint32_t triangle, const std::array<Vec2d, 3>& uv, double maxStretch) const {
   const auto& v = mesh_.triangles[triangle];
-  const Vec3d a = mesh_.points[v[1]] - mesh_.points[v[0]];
-  const Vec3d b = mesh_.points[v[2]] - mesh_.points[v[0]];
-  const double x1 = glm::length(a);
-  const double x2 = glm::dot(a, b) / x1;
-  const double y2 = glm::length(glm::cross(a, b)) / x1;
-  const Vec2d jx = (uv[1] - uv[0]) / x1;
-  const Vec2d jy = (uv[2] - uv[0] - jx * x2) / y2;
-  const double det = cross2(jx, jy);
-  if (!(det > 0)) return false;
-  const double trace = glm::dot(jx, jx) + glm::dot(jy, jy);
-  const double big = std::sqrt((trace + std::sqrt(std::max(0.0, trace * trace - 4 * det * det))) / 2);
-  return big <= maxStretch && det / big * maxStretch >= 1;
+  // A sliver may lie turned over by less than a float UV can tell, but no further.
+  if (!(doubleArea(uv) > 0)) return !(doubleArea(corners(triangle)) > 0) && !isFlipped(uv);
+  const FlatTriangle surface = layFlat({mesh_.points[v[0]], mesh_.points[v[1]], mesh_.points[v[2]]});
+  return singularValues(surface, uv).within(maxStretch);
 }
 
-bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const RigidMotion& motion, const std::vector<MeshEdge>& matched,
-                         const MergeOptions& options) const {
+Vec2d ChartSheet::placeOf(std::uint32_t triangle, std::uint32_t k, const Welded& welded) const {
+  const std::uint32_t vertex = vertexAt(triangle, k % 3);
+  const auto place = welded.places.find(vertex);
+  return place != welded.places.end() ? place->second : welded.motion.apply(uvs_[vertex]);
+}
+
+bool ChartSheet::closesBreak(std::uint32_t into, std::uint32_t from, const Welded& welded) const {
+  const bool fewer = charts_[from].breaks.size() < charts_[into].breaks.size();
+  const double gap = frameGap(charts_[into].normals.area + charts_[from].normals.area);
+  for (const FrameBreak& edge : charts_[fewer ? from : into].breaks) {
+    const std::uint32_t a = chartOf(edge.cornerA / 3);
+    const std::uint32_t b = chartOf(edge.cornerB / 3);
+    if (!(a == into && b == from) && !(a == from && b == into)) continue;
+    const std::uint32_t still = a == into ? edge.cornerA : edge.cornerB;
+    const std::uint32_t moved = a == into ? edge.cornerB : edge.cornerA;
+    const Vec2d start = uvs_[vertexAt(still / 3, still % 3)] - placeOf(moved / 3, moved % 3 + 1, welded);
+    const Vec2d end = uvs_[vertexAt(still / 3, (still + 1) % 3)] - placeOf(moved / 3, moved % 3, welded);
+    if (glm::length(start) < gap && glm::length(end) < gap) return true;
+  }
+  return false;
+}
+
+bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit, const MergeOptions& options) const {
   const Chart& target = charts_[into];
   const Chart& moved = charts_[from];
-  std::unordered_map<std::uint32_t, Vec2d> welded;  // looked up only
-  for (const MeshEdge edge : matched) {
+  Welded welded{fit.motion, {}};
+  for (const MeshEdge edge : fit.matched) {
     const MeshEdge other = beyond(edge);
-    welded[vertexAt(other.triangle, other.k)] = uvs_[vertexAt(edge.triangle, (edge.k + 1) % 3)];
-    welded[vertexAt(other.triangle, (other.k + 1) % 3)] = uvs_[vertexAt(edge.triangle, edge.k)];
+    welded.places[vertexAt(other.triangle, other.k)] = uvs_[vertexAt(edge.triangle, (edge.k + 1) % 3)];
+    welded.places[vertexAt(other.triangle, (other.k + 1) % 3)] = uvs_[vertexAt(edge.triangle, edge.k)];
   }
+  if (closesBreak(into, from, welded)) return false;
   Vec2d low = target.low, high = target.high;
   const double maxStretch = options.maxStretch * std::sqrt(smallChartSlack(moved.normals.area));
   for (const std::uint32_t t : moved.triangles) {
-    std::array<Vec2d, 3> uv = corners(t);
+    std::array<Vec2d, 3> uv;
     bool touched = false;
     for (std::uint32_t k = 0; k < 3; ++k) {
-      const auto place = welded.find(vertexAt(t, k));
-      touched = touched || place != welded.end();
-      uv[k] = place != welded.end() ? place->second : motion.apply(uv[k]);
+      touched = touched || welded.places.contains(vertexAt(t, k));
+      uv[k] = placeOf(t, k, welded);
       low = glm::min(low, uv[k]);
       high = glm::max(high, uv[k]);
     }
-    if (touched && doubleArea(corners(t)) > 0 && !staysGood(t, uv, maxStretch)) return false;
+    if (touched && !staysGood(t, uv, maxStretch)) return false;
     for (std::uint32_t k = 0; k < 3; ++k) {
       if (joined_[localTriangle_[t]][k]) continue;
       bool hit = false;
@@ -255,12 +276,25 @@ bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const RigidMoti
   return packsWell(high - low, target.normals.area + moved.normals.area, options.largestSide);
 }
 
-void ChartSheet::join(std::uint32_t into, std::uint32_t from, const RigidMotion& motion, const std::vector<MeshEdge>& matched) {
+/// To be called while the triangles of both charts still answer to their own.
+void ChartSheet::joinBreaks(std::uint32_t into, std::uint32_t from) {
+  std::vector<FrameBreak> kept;
+  for (const std::uint32_t chart : {into, from})
+    for (const FrameBreak& edge : charts_[chart].breaks) {
+      const std::uint32_t other = chartOf(edge.cornerA / 3) == chart ? chartOf(edge.cornerB / 3) : chartOf(edge.cornerA / 3);
+      if (other != into && other != from) kept.push_back(edge);
+    }
+  charts_[into].breaks = std::move(kept);
+  charts_[from].breaks = {};
+}
+
+void ChartSheet::join(std::uint32_t into, std::uint32_t from, const Fit& fit) {
+  joinBreaks(into, from);
   Chart& target = charts_[into];
   Chart& moved = charts_[from];
   for (const std::uint32_t v : moved.vertices)
-    if (parent_[v] == v) uvs_[v] = motion.apply(uvs_[v]);
-  for (const MeshEdge edge : matched) {
+    if (parent_[v] == v) uvs_[v] = fit.motion.apply(uvs_[v]);
+  for (const MeshEdge edge : fit.matched) {
     const MeshEdge other = beyond(edge);
     const std::array<std::uint32_t, 2> keep = {vertexAt(edge.triangle, edge.k), vertexAt(edge.triangle, (edge.k + 1) % 3)};
     const std::array<std::uint32_t, 2> drop = {vertexAt(other.triangle, (other.k + 1) % 3), vertexAt(other.triangle, other.k)};
@@ -310,9 +344,17 @@ ChartMesh ChartSheet::together(std::uint32_t a, std::uint32_t b, const std::vect
   return mesh;
 }
 
+bool ChartSheet::closesBreak(std::uint32_t a, std::uint32_t b, const FlatChart& flat) const {
+  const std::vector<FrameBreak>& breaks = charts_[charts_[a].breaks.size() < charts_[b].breaks.size() ? a : b].breaks;
+  return std::any_of(breaks.begin(), breaks.end(), [&flat](const FrameBreak& edge) { return isClosed(flat, edge); });
+}
+
 void ChartSheet::replace(std::uint32_t into, std::uint32_t from, const FlatChart& flat) {
+  joinBreaks(into, from);
+  std::vector<FrameBreak> breaks = std::move(charts_[into].breaks);
   charts_[from] = {};
   addTriangles(into, flat);
+  charts_[into].breaks = std::move(breaks);
   for (const std::uint32_t t : flat.mesh.meshTriangles)
     for (std::uint32_t k = 0; k < 3; ++k)
       if (!joined_[localTriangle_[t]][k]) insertBorder(charts_[into], {t, k});

@@ -22,6 +22,13 @@ struct MeshEdge {
   std::uint32_t k = 0;
 };
 
+/// A way to lay one chart against another: the motion, and the shared edges that then meet.
+struct Fit {
+  RigidMotion motion;
+  std::vector<MeshEdge> matched;
+  double length = 0;  // texels of `matched`
+};
+
 class ChartSheet {
  public:
   struct Chart {
@@ -30,27 +37,33 @@ class ChartSheet {
     NormalMoments normals;
     double perimeter = 0;                  // texels
     Vec2d low{0.0}, high{0.0};
+    std::vector<FrameBreak> breaks;        // of the mesh, with a side in this chart and the other in another
     std::unordered_map<std::uint64_t, std::vector<MeshEdge>> border;  // by cell; looked up only
   };
 
-  ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& charts, const std::vector<std::uint32_t>& localTriangle);
+  /// `breaks`: those of the mesh's whose both sides are in the sheet.
+  ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& charts, const std::vector<std::uint32_t>& localTriangle,
+             const std::vector<FrameBreak>& breaks);
 
   const Chart& chart(std::uint32_t i) const { return charts_[i]; }
   std::uint32_t chartOf(std::uint32_t meshTriangle) const { return chartOf_[localTriangle_[meshTriangle]]; }
   MeshEdge beyond(MeshEdge edge) const;
 
-  /// How a chart must move so that its side of the shared edges meets the other side, from which they are given; fills
-  /// `matched` with the edges that do meet. `slack` multiplies the tolerance. False: none meets.
-  bool fit(const std::vector<MeshEdge>& shared, double slack, RigidMotion& motion, std::vector<MeshEdge>& matched) const;
+  /// How a chart may move so that its side of the shared edges meets the other side, from which they are given: the
+  /// fit to all of them and to single ones, the longest match first. `slack` multiplies the tolerance.
+  std::vector<Fit> fits(const std::vector<MeshEdge>& shared, double slack) const;
 
-  /// Whether `from`, moved and welded at `matched`, keeps within the limits and lies on nothing of `into`.
-  bool mayJoin(std::uint32_t into, std::uint32_t from, const RigidMotion& motion, const std::vector<MeshEdge>& matched,
-               const MergeOptions& options) const;
+  /// Whether `from`, moved and welded at the matched edges, keeps within the limits, lies on nothing of `into` and
+  /// closes no break of the material's frame.
+  bool mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit, const MergeOptions& options) const;
 
-  void join(std::uint32_t into, std::uint32_t from, const RigidMotion& motion, const std::vector<MeshEdge>& matched);
+  void join(std::uint32_t into, std::uint32_t from, const Fit& fit);
 
   /// The two charts as one mesh, joined along `shared` as well (edges from the side of either), without UVs.
   ChartMesh together(std::uint32_t a, std::uint32_t b, const std::vector<MeshEdge>& shared) const;
+
+  /// Whether a new flattening of both charts lays the sides of a break of the frame against each other.
+  bool closesBreak(std::uint32_t a, std::uint32_t b, const FlatChart& flat) const;
 
   /// Replaces the two charts by `into` with a new flattening of both.
   void replace(std::uint32_t into, std::uint32_t from, const FlatChart& flat);
@@ -61,12 +74,21 @@ class ChartSheet {
   double length(MeshEdge edge) const;
 
  private:
+  /// A chart as it would lie: moved, with some of its vertices welded.
+  struct Welded {
+    const RigidMotion& motion;
+    std::unordered_map<std::uint32_t, Vec2d> places;  // by vertex; looked up only
+  };
+
+  Vec2d placeOf(std::uint32_t triangle, std::uint32_t k, const Welded& welded) const;
   std::uint32_t vertexAt(std::uint32_t triangle, std::uint32_t k) const;
   std::array<Vec2d, 3> corners(std::uint32_t triangle) const;
   template <class Visit>
   void visitCells(Vec2d a, Vec2d b, Visit visit) const;
   void addTriangles(std::uint32_t index, const FlatChart& flat);
   void insertBorder(Chart& chart, MeshEdge edge);
+  bool closesBreak(std::uint32_t into, std::uint32_t from, const Welded& welded) const;
+  void joinBreaks(std::uint32_t into, std::uint32_t from);
   bool staysGood(std::uint32_t triangle, const std::array<Vec2d, 3>& uv, double maxStretch) const;
 
   const HalfEdgeMesh& mesh_;

@@ -3,13 +3,13 @@
 #include <Eigen/Sparse>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
-#include <queue>
+
+#include "lightmap/nested_dissection.h"
 
 namespace lumel {
 namespace {
 
 constexpr double kFlatCosine = 0.9998;    // within 1.15 degrees of the plane: projection shortens by 0.02 %
-constexpr double kThinTexels = 0.01;      // triangles thinner than this may stand askew: nothing of it shows
 constexpr double kOverlapTexels = 2e-3;   // parts may lie on each other by less: far below a sample's distance
 constexpr double kMaxBadShare = 0.004;    // of a chart's surface, beyond the stretch limit
 constexpr double kMaxL2 = 1.03;
@@ -32,9 +32,7 @@ double worstCosine(const ChartMesh& chart, Vec3d normal) {
     const auto& v = chart.triangles[t];
     const Vec3d n = glm::cross(chart.points[v[1]] - chart.points[v[0]], chart.points[v[2]] - chart.points[v[0]]);
     const double area = glm::length(n);
-    const FlatTriangle flat = layFlat(chart, t);
-    const double longest = std::max({flat.x1, std::hypot(flat.x2, flat.y2), std::hypot(flat.x2 - flat.x1, flat.y2)});
-    if (area < kThinTexels * longest) continue;
+    if (shortestHeight(layFlat(chart, t)) < kThinTexels) continue;
     worst = std::min(worst, glm::dot(n, normal) / area);
   }
   return worst;
@@ -74,41 +72,48 @@ std::uint32_t innermostTriangle(const ChartMesh& chart) {
   return queue.back();
 }
 
+/// Directions of the triangle's edges (k, k + 1), as layFlat has it.
+std::array<Vec2d, 3> edges(const FlatTriangle& f) {
+  return {Vec2d(f.x1, 0), Vec2d(f.x2 - f.x1, f.y2), Vec2d(-f.x2, -f.y2)};
+}
+
+/// As complex numbers.
+Vec2d times(Vec2d a, Vec2d b) { return {a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x}; }
+Vec2d conjugate(Vec2d a) { return {a.x, -a.y}; }
+
 /// Lays triangle after triangle beside one that lies already, breadth first: exact where the chart is developable.
+/// How each one is turned follows from its neighbour's turn and the angles between their edges. Read off the places of
+/// points instead, rounding errors would grow by a factor with every triangle.
 std::vector<Vec2d> unroll(const ChartMesh& chart) {
   std::vector<Vec2d> uvs(chart.points.size(), Vec2d(0.0));
   std::vector<std::uint8_t> placed(chart.points.size(), 0);
-  std::vector<bool> seen(chart.triangles.size(), false);
+  std::vector<Vec2d> turn(chart.triangles.size(), Vec2d(0.0));  // of layFlat's x axis; 0: not yet laid
   const std::uint32_t first = innermostTriangle(chart);
+  turn[first] = Vec2d(1, 0);
   const FlatTriangle flat = layFlat(chart, first);
-  const auto& v = chart.triangles[first];
-  uvs[v[1]] = {flat.x1, 0};
-  uvs[v[2]] = {flat.x2, flat.y2};
-  for (const std::uint32_t i : v) placed[i] = 1;
+  uvs[chart.triangles[first][1]] = {flat.x1, 0};
+  uvs[chart.triangles[first][2]] = {flat.x2, flat.y2};
+  for (const std::uint32_t i : chart.triangles[first]) placed[i] = 1;
   std::vector<std::uint32_t> queue = {first};
-  seen[first] = true;
   for (std::size_t head = 0; head < queue.size(); ++head) {
     const std::uint32_t t = queue[head];
+    const std::array<Vec2d, 3> sides = edges(layFlat(chart, t));
     for (std::size_t k = 0; k < 3; ++k) {
       const std::int32_t n = chart.neighbours[t][k];
-      if (n < 0 || seen[static_cast<std::size_t>(n)]) continue;
+      if (n < 0 || turn[static_cast<std::size_t>(n)] != Vec2d(0.0)) continue;
       const auto u = static_cast<std::uint32_t>(n);
-      seen[u] = true;
       queue.push_back(u);
-      const std::uint32_t a = chart.triangles[t][(k + 1) % 3];  // the edge as the neighbour runs it: a to b
-      const std::uint32_t b = chart.triangles[t][k];
-      std::uint32_t c = 0;
-      for (const std::uint32_t i : chart.triangles[u])
-        if (i != a && i != b) c = i;
-      if (placed[c]) continue;
-      placed[c] = 1;
-      const Vec3d edge = chart.points[b] - chart.points[a];
-      const Vec3d arm = chart.points[c] - chart.points[a];
-      const double length2 = glm::dot(edge, edge);
-      const double along = glm::dot(arm, edge) / length2;
-      const double above = glm::length(glm::cross(edge, arm)) / length2;
-      const Vec2d e = uvs[b] - uvs[a];
-      uvs[c] = uvs[a] + along * e + above * Vec2d(-e.y, e.x);
+      const auto& v = chart.triangles[u];
+      const std::uint32_t from = chart.triangles[t][(k + 1) % 3];  // the edge as the neighbour runs it
+      const std::uint32_t to = chart.triangles[t][k];
+      std::size_t j = 0;
+      while (j < 2 && !(v[j] == from && v[(j + 1) % 3] == to)) ++j;
+      const std::array<Vec2d, 3> theirs = edges(layFlat(chart, u));
+      turn[u] = glm::normalize(times(times(-sides[k], turn[t]), conjugate(theirs[j])));
+      const std::uint32_t apex = v[(j + 2) % 3];
+      if (placed[apex]) continue;
+      placed[apex] = 1;
+      uvs[apex] = uvs[from] - times(theirs[(j + 2) % 3], turn[u]);
     }
   }
   return uvs;
@@ -117,9 +122,24 @@ std::vector<Vec2d> unroll(const ChartMesh& chart) {
 /// Local/global iterations: rotations per triangle, then one solve with a matrix that is factored once.
 class RigidRelaxation {
  public:
-  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), flat_(chart.triangles.size()) {
-    for (std::size_t t = 0; t < flat_.size(); ++t) flat_[t] = layFlat(chart, t);
+  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), row_(chart.points.size()) {
+    const std::vector<std::uint32_t> order = nestedDissection(chart.points, chart.triangles);
+    for (std::uint32_t i = 0; i < order.size(); ++i) row_[order[i]] = i;
+    fixed_ = order.back();
     solver_.compute(laplacian());
+  }
+
+  /// Iteratively reweighted towards a fourth power of the error: triangles beyond `limit` pull harder, so that the
+  /// distortion spreads from where it is worst.
+  void emphasiseWorst(const std::vector<Vec2d>& uvs, double limit) {
+    emphasis_.resize(chart_.triangles.size(), 1.0);
+    for (std::size_t t = 0; t < emphasis_.size(); ++t) {
+      const double excess = (worstStretch(t, uvs) - 1) / (limit - 1);
+      constexpr double kLeast = 0.1, kMost = 4.0;
+      const double wanted = std::clamp(excess, kLeast, kMost);
+      emphasis_[t] = std::sqrt(emphasis_[t] * wanted * wanted);
+    }
+    solver_.factorize(laplacian());
   }
 
   bool usable() const { return solver_.info() == Eigen::Success; }
@@ -127,14 +147,14 @@ class RigidRelaxation {
   /// One iteration; returns how far points moved, root mean square, or a negative number if the solve failed.
   double step(std::vector<Vec2d>& uvs) const {
     Eigen::MatrixX2d right = Eigen::MatrixX2d::Zero(static_cast<Eigen::Index>(uvs.size()) - 1, 2);
-    for (std::size_t t = 0; t < flat_.size(); ++t) addTriangle(t, uvs, right);
+    for (std::size_t t = 0; t < chart_.triangles.size(); ++t) addTriangle(t, uvs, right);
     const Eigen::MatrixX2d solved = solver_.solve(right);
     if (!solved.allFinite()) return -1;
     double moved = 0;
-    const Vec2d shift = uvs[0];
-    uvs[0] = Vec2d(0.0);
-    for (std::size_t i = 1; i < uvs.size(); ++i) {
-      const Vec2d now(solved(static_cast<Eigen::Index>(i) - 1, 0), solved(static_cast<Eigen::Index>(i) - 1, 1));
+    const Vec2d shift = uvs[fixed_];
+    for (std::size_t i = 0; i < uvs.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(row_[i]);
+      const Vec2d now = i == fixed_ ? Vec2d(0.0) : Vec2d(solved(row, 0), solved(row, 1));
       const Vec2d delta = now + shift - uvs[i];
       moved += glm::dot(delta, delta);
       uvs[i] = now;
@@ -144,62 +164,67 @@ class RigidRelaxation {
 
  private:
   struct Entry {
-    std::uint32_t column, row;  // row > column: the lower triangle
+    std::uint32_t column, row;  // row < column: the upper triangle
     double weight;
     bool operator<(const Entry& other) const { return column != other.column ? column < other.column : row < other.row; }
   };
 
-  /// Cotangent Laplacian without point 0, lower triangle; assembled in place, at 16 bytes per triangle side.
+  /// Cotangent Laplacian without the fixed point, upper triangle (what Eigen reads without a copy); assembled in place,
+  /// at 16 bytes per triangle side.
   Eigen::SparseMatrix<double> laplacian() const {
-    const auto unknowns = static_cast<Eigen::Index>(chart_.points.size() - 1);  // point 0 stays at the origin
+    const auto unknowns = static_cast<std::uint32_t>(chart_.points.size() - 1);  // the last point stays at the origin
     std::vector<double> diagonal(chart_.points.size(), 0.0);
     std::vector<Entry> entries;
-    entries.reserve(3 * flat_.size());
-    for (std::size_t t = 0; t < flat_.size(); ++t) {
-      const std::array<double, 3> weight = cotangents(flat_[t]);
+    entries.reserve(3 * chart_.triangles.size());
+    for (std::size_t t = 0; t < chart_.triangles.size(); ++t) {
+      const std::array<double, 3> weight = cotangents(t, layFlat(chart_, t));
       for (std::size_t k = 0; k < 3; ++k) {
-        const std::uint32_t i = chart_.triangles[t][k];
-        const std::uint32_t j = chart_.triangles[t][(k + 1) % 3];
+        const std::uint32_t i = row_[chart_.triangles[t][k]];
+        const std::uint32_t j = row_[chart_.triangles[t][(k + 1) % 3]];
         diagonal[i] += weight[k];
         diagonal[j] += weight[k];
-        if (i > 0 && j > 0) entries.push_back({std::min(i, j) - 1, std::max(i, j) - 1, weight[k]});
+        if (i < unknowns && j < unknowns) entries.push_back({std::max(i, j), std::min(i, j), weight[k]});
       }
     }
     std::sort(entries.begin(), entries.end());
     Eigen::SparseMatrix<double> matrix(unknowns, unknowns);
-    matrix.reserve(unknowns + static_cast<Eigen::Index>(entries.size() * 2 / 3));
+    matrix.reserve(static_cast<Eigen::Index>(unknowns + entries.size() * 2 / 3));
     std::size_t next = 0;
-    for (Eigen::Index column = 0; column < unknowns; ++column) {
+    for (std::uint32_t column = 0; column < unknowns; ++column) {
       matrix.startVec(column);
-      matrix.insertBack(column, column) = diagonal[static_cast<std::size_t>(column) + 1];
-      while (next < entries.size() && entries[next].column == static_cast<std::uint32_t>(column)) {
+      while (next < entries.size() && entries[next].column == column) {
         const std::uint32_t row = entries[next].row;
         double sum = 0;
-        for (; next < entries.size() && entries[next].column == static_cast<std::uint32_t>(column) && entries[next].row == row; ++next)
+        for (; next < entries.size() && entries[next].column == column && entries[next].row == row; ++next)
           sum += entries[next].weight;
-        matrix.insertBack(static_cast<Eigen::Index>(row), column) = -sum;
+        matrix.insertBack(row, column) = -sum;
       }
+      matrix.insertBack(column, column) = diagonal[column];
     }
     matrix.finalize();
     return matrix;
   }
 
-  static std::array<Vec2d, 3> edges(const FlatTriangle& f) {
-    return {Vec2d(f.x1, 0), Vec2d(f.x2 - f.x1, f.y2), Vec2d(-f.x2, -f.y2)};
+  /// The larger of the greatest singular value and the inverse of the least; very large where turned over.
+  double worstStretch(std::size_t t, const std::vector<Vec2d>& uvs) const {
+    const auto& v = chart_.triangles[t];
+    const SingularValues s = singularValues(layFlat(chart_, t), {uvs[v[0]], uvs[v[1]], uvs[v[2]]});
+    return s.small > 0 ? std::max(s.big, 1 / s.small) : 1e3;
   }
 
   /// Of the angle opposite each edge (k, k + 1).
-  static std::array<double, 3> cotangents(const FlatTriangle& f) {
-    const std::array<Vec2d, 3> e = edges(f);
-    const double area2 = f.x1 * f.y2;
+  std::array<double, 3> cotangents(std::size_t t, const FlatTriangle& flat) const {
+    const std::array<Vec2d, 3> e = edges(flat);
+    const double factor = (emphasis_.empty() ? 1.0 : emphasis_[t]) / (flat.x1 * flat.y2);
     std::array<double, 3> cot;
-    for (std::size_t k = 0; k < 3; ++k) cot[k] = -glm::dot(e[(k + 1) % 3], e[(k + 2) % 3]) / area2;
+    for (std::size_t k = 0; k < 3; ++k) cot[k] = -factor * glm::dot(e[(k + 1) % 3], e[(k + 2) % 3]);
     return cot;
   }
 
   void addTriangle(std::size_t t, const std::vector<Vec2d>& uvs, Eigen::MatrixX2d& right) const {
-    const std::array<Vec2d, 3> e = edges(flat_[t]);
-    const std::array<double, 3> weight = cotangents(flat_[t]);
+    const FlatTriangle flat = layFlat(chart_, t);
+    const std::array<Vec2d, 3> e = edges(flat);
+    const std::array<double, 3> weight = cotangents(t, flat);
     const auto& v = chart_.triangles[t];
     double cosine = 0, sine = 0;  // of the rotation that fits best, not yet normalised
     for (std::size_t k = 0; k < 3; ++k) {
@@ -216,16 +241,18 @@ class RigidRelaxation {
     }
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec2d turned = weight[k] * Vec2d(cosine * e[k].x - sine * e[k].y, sine * e[k].x + cosine * e[k].y);
-      const auto i = static_cast<Eigen::Index>(v[k]) - 1;
-      const auto j = static_cast<Eigen::Index>(v[(k + 1) % 3]) - 1;
-      if (i >= 0) right.row(i) -= Eigen::RowVector2d(turned.x, turned.y);
-      if (j >= 0) right.row(j) += Eigen::RowVector2d(turned.x, turned.y);
+      const std::uint32_t i = v[k];
+      const std::uint32_t j = v[(k + 1) % 3];
+      if (i != fixed_) right.row(row_[i]) -= Eigen::RowVector2d(turned.x, turned.y);
+      if (j != fixed_) right.row(row_[j]) += Eigen::RowVector2d(turned.x, turned.y);
     }
   }
 
   const ChartMesh& chart_;
-  std::vector<FlatTriangle> flat_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
+  std::vector<double> emphasis_;    // per triangle: multiplies its cotangents; empty: 1
+  std::vector<std::uint32_t> row_;  // per point: of the matrix
+  std::uint32_t fixed_ = 0;         // the last row's point, at the origin: it is no unknown
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>> solver_;
 };
 
 bool isGood(const ChartMesh& chart, std::span<const Vec2d> uvs, const FlattenOptions& options) {
@@ -241,9 +268,28 @@ bool isDevelopable(const ChartMesh& chart, std::span<const Vec2d> uvs, const Fla
   return stretch.flipped == 0 && stretch.badShare <= kMaxBadShare / 4 && stretch.l2 <= kIsometricL2;
 }
 
+/// A layout without flips that fails by little of its surface: evens the stretch out.
+bool spreadStretch(const ChartMesh& chart, RigidRelaxation& relaxation, std::vector<Vec2d>& uvs, const FlattenOptions& options) {
+  constexpr double kHopelessShare = 0.1;       // of the surface
+  constexpr std::size_t kMostTriangles = 8000; // each round is a factorization
+  constexpr int kRounds = 8, kStepsPerRound = 4;
+  if (chart.triangles.size() > kMostTriangles) return false;
+  const Stretch before = measureStretch(chart, uvs, options.maxStretch);
+  if (before.flipped > 0 || before.badShare > kHopelessShare) return false;
+  for (int round = 0; round < kRounds; ++round) {
+    relaxation.emphasiseWorst(uvs, options.maxStretch);
+    if (!relaxation.usable()) return false;
+    for (int i = 0; i < kStepsPerRound; ++i)
+      if (relaxation.step(uvs) < 0) return false;
+    scaleToSurface(chart, uvs);
+    if (isGood(chart, uvs, options)) return true;
+  }
+  return false;
+}
+
 /// Relaxes until nothing moves. False: the chart cannot be laid flat well.
 bool relax(const ChartMesh& chart, std::vector<Vec2d>& uvs, const FlattenOptions& options) {
-  const RigidRelaxation relaxation(chart);
+  RigidRelaxation relaxation(chart);
   if (!relaxation.usable()) return false;
   double l2 = 0;
   for (int i = 0; i < kMaxIterations; ++i) {
@@ -257,7 +303,8 @@ bool relax(const ChartMesh& chart, std::vector<Vec2d>& uvs, const FlattenOptions
     l2 = now.l2;
   }
   scaleToSurface(chart, uvs);
-  return isGood(chart, uvs, options);
+  if (isGood(chart, uvs, options)) return true;
+  return spreadStretch(chart, relaxation, uvs, options);
 }
 
 }  // namespace

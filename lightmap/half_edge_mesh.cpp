@@ -198,6 +198,7 @@ class Builder {
       }
       mesh_.triangles[corner / 3][corner % 3] = static_cast<std::uint32_t>(vertex);
     }
+    mesh_.points.shrink_to_fit();
     std::vector<std::uint32_t> triangleOfFace;
     std::vector<std::uint32_t> misfits;
     for (const std::uint32_t t : sheetOrder()) {

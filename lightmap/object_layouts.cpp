@@ -127,9 +127,8 @@ ObjectLayouts layOutObjects(const Scene& scene, const std::vector<int>& instance
     for (std::size_t i = first; i < last && !progress.cancelled(); ++i) {
       ObjectLayout& layout = result.layouts[i];
       const Instance& instance = scene.instances[static_cast<std::size_t>(instances[leaders[i]])];
-      const TriangleSoup soup = makeSoup(scene, instance, texelsPerMeter, layout.source);
-      layout.unwrapped = unwrap(soup, options);
-      progress.advance(soup.triangleCount());
+      layout.unwrapped = unwrap(makeSoup(scene, instance, texelsPerMeter, layout.source), options);
+      progress.advance(layout.source.size());
     }
   });
   return result;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "lightmap/chart_cut.h"
 #include "lightmap/chart_growing.h"
 #include "lightmap/chart_merging.h"
 #include "lightmap/flatten.h"
@@ -82,6 +83,9 @@ class Unwrapper {
  private:
   bool tryFlatten(std::vector<std::uint32_t> triangles, FlatChart& chart) const {
     chart.mesh = makeChartMesh(mesh_, std::move(triangles));
+    const ChartForm form = formOf(chart.mesh);
+    if (form == ChartForm::Closed) return false;
+    if (form == ChartForm::Band) cutBand(mesh_, chart.mesh);
     Flattening flat = flatten(chart.mesh, {options_.maxStretch, options_.largestSide});
     chart.uvs = std::move(flat.uvs);
     return flat.valid;
@@ -124,8 +128,9 @@ class Unwrapper {
 
 }  // namespace
 
-Unwrapped unwrap(const TriangleSoup& soup, const UnwrapOptions& options) {
+Unwrapped unwrap(TriangleSoup&& soup, const UnwrapOptions& options) {
   const HalfEdgeMesh mesh = buildHalfEdgeMesh(soup);
+  soup = {};
   GrowOptions growOptions;
   growOptions.largestSide = options.largestSide;
   const MergeTree tree = growCharts(mesh, growOptions);
@@ -138,6 +143,7 @@ Unwrapped unwrap(const TriangleSoup& soup, const UnwrapOptions& options) {
   std::vector<FlatChart> charts;
   for (std::vector<FlatChart>& region : perRegion)
     for (FlatChart& flat : region) charts.push_back(std::move(flat));
+  charts = splitAtFrameSlits(mesh, std::move(charts));
   charts = mergeCharts(mesh, std::move(charts), {options.maxStretch, options.largestSide});
   charts = splitAtFrameSlits(mesh, std::move(charts));
 

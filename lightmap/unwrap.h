@@ -28,7 +28,7 @@ struct Unwrapped {
   bool tooLarge = false;  // a single triangle is longer than largestSide
 };
 
-/// Deterministic; parallel over charts.
-Unwrapped unwrap(const TriangleSoup& soup, const UnwrapOptions& options);
+/// Deterministic; parallel over charts. Takes the soup, to be rid of it before memory is at its peak.
+Unwrapped unwrap(TriangleSoup&& soup, const UnwrapOptions& options);
 
 }  // namespace lumel

@@ -9,24 +9,6 @@
 namespace lumel {
 namespace {
 
-Scene terrain(int cells, double side) {
-  std::vector<Vec3> positions, normals;
-  std::vector<std::uint32_t> indices;
-  for (int y = 0; y <= cells; ++y)
-    for (int x = 0; x <= cells; ++x) {
-      const double u = side * x / cells, v = side * y / cells;
-      positions.push_back(Vec3(u, v, 3 * std::sin(0.11 * u) * std::cos(0.13 * v) + 0.8 * std::sin(0.43 * u + 1) * std::sin(0.37 * v)));
-      const double du = 0.33 * std::cos(0.11 * u) * std::cos(0.13 * v) + 0.344 * std::cos(0.43 * u + 1) * std::sin(0.37 * v);
-      const double dv = -0.39 * std::sin(0.11 * u) * std::sin(0.13 * v) + 0.296 * std::sin(0.43 * u + 1) * std::cos(0.37 * v);
-      normals.push_back(Vec3(glm::normalize(Vec3d(-du, -dv, 1))));
-    }
-  const auto at = [cells](int x, int y) { return static_cast<std::uint32_t>(y * (cells + 1) + x); };
-  for (int y = 0; y < cells; ++y)
-    for (int x = 0; x < cells; ++x)
-      for (const std::uint32_t i : {at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y), at(x + 1, y + 1), at(x, y + 1)}) indices.push_back(i);
-  return sceneOf(std::move(positions), std::move(indices), std::move(normals));
-}
-
 TEST(LargeTerrain, OfAHundredThousandTrianglesIsAFewSoundCharts) {
   const Scene scene = terrain(224, 100);
   const auto start = std::chrono::steady_clock::now();
@@ -40,6 +22,32 @@ TEST(LargeTerrain, OfAHundredThousandTrianglesIsAFewSoundCharts) {
   EXPECT_LE(f.worstStretch, 1.15);
   // About 2 s alone on one core; a quadratic step would take minutes. Wide, because test machines are shared.
   EXPECT_LT(seconds, 60);
+}
+
+TEST(LargePipe, OfAMillionTrianglesUnrollsWhole) {
+  constexpr std::uint32_t kSides = 1000, kRings = 500;
+  std::vector<Vec3> positions, normals;
+  std::vector<std::uint32_t> indices;
+  for (std::uint32_t y = 0; y <= kRings; ++y)
+    for (std::uint32_t x = 0; x < kSides; ++x) {
+      const double a = 2 * std::numbers::pi * x / kSides;
+      positions.push_back(Vec3(10 * std::cos(a), 10 * std::sin(a), 0.1 * y));
+      normals.push_back(Vec3(std::cos(a), std::sin(a), 0));
+    }
+  for (std::uint32_t y = 0; y < kRings; ++y)
+    for (std::uint32_t x = 0; x < kSides; ++x) {
+      const std::uint32_t a = y * kSides + x, b = y * kSides + (x + 1) % kSides;
+      for (const std::uint32_t i : {a, b, b + kSides, a, b + kSides, a + kSides}) indices.push_back(i);
+    }
+  const AtlasResult result = chartsOf(sceneOf(std::move(positions), std::move(indices), std::move(normals)), 10, 1024);
+  const AtlasFigures f = measureAtlas(result.atlas);
+  EXPECT_EQ(f.triangles, 2u * kSides * kRings);
+  EXPECT_EQ(f.flipped, 0u);
+  EXPECT_EQ(f.overlapTexels, 0.0);
+  EXPECT_EQ(f.charts, 1u);
+  EXPECT_LE(f.worstStretch, 1.001);
+  // 628.3 x 500 texels, to within the texels of its border.
+  EXPECT_NEAR(f.coveredTexels, 628.3 * 500, 2 * (628 + 500));
 }
 
 TEST(LargeTerrain, ThatIsLargerThanAPageIsCutToFit) {

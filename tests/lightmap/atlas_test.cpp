@@ -141,6 +141,11 @@ TEST(Charts, CubeHasAtMostSix) {
   EXPECT_LE(expectSound(box(Vec3(0), Vec3(1)), 50).charts, 6u);
 }
 
+TEST(Charts, BoardOfOneTexelHasTwo) {
+  // Each of its narrow sides lies beside the top or the bottom: alone it would be all gutter.
+  EXPECT_EQ(expectSound(box(Vec3(0), Vec3(3, 2, 0.05f)), 20).charts, 2u);
+}
+
 TEST(Charts, OneTriangle) {
   Shape s;
   s.positions = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}};
@@ -261,10 +266,14 @@ TEST_P(Scales, ChangeNothingButTheUnit) {
   s.add(shadedFlat(box(Vec3(4, 0, 0), Vec3(4.01f, 3, 1))));
   const std::size_t charts = expectSound(s, 20).charts;
   for (Vec3& p : s.positions) p *= GetParam();
-  EXPECT_EQ(expectSound(s, 20 / GetParam()).charts, charts);
+  const std::size_t scaled = expectSound(s, 20 / GetParam()).charts;
+  // A power of two leaves every bit of the geometry as it is. Others round positions anew, and where a torus's alike
+  // bands are parted hangs on their last bits.
+  const bool exact = std::exp2(std::round(std::log2(GetParam()))) == GetParam();
+  EXPECT_NEAR(static_cast<double>(scaled), static_cast<double>(charts), exact ? 0 : 1);
 }
 
-INSTANTIATE_TEST_SUITE_P(, Scales, testing::Values(1e-4f, 1e6f));
+INSTANTIATE_TEST_SUITE_P(, Scales, testing::Values(1e-4f, 1e6f, 0x1p-13f, 0x1p20f));
 
 TEST(Charts, BreakAtMirroredMaterialFramesOnly) {
   // Two coplanar squares, the right one with its texture mirrored.

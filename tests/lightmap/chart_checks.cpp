@@ -142,4 +142,22 @@ AtlasResult chartsOf(const Scene& scene, float texelsPerMeter, int pageSize) {
   return std::move(*result);
 }
 
+Scene terrain(int cells, double side) {
+  std::vector<Vec3> positions, normals;
+  std::vector<std::uint32_t> indices;
+  for (int y = 0; y <= cells; ++y)
+    for (int x = 0; x <= cells; ++x) {
+      const double u = side * x / cells, v = side * y / cells;
+      positions.push_back(Vec3(u, v, 3 * std::sin(0.11 * u) * std::cos(0.13 * v) + 0.8 * std::sin(0.43 * u + 1) * std::sin(0.37 * v)));
+      const double du = 0.33 * std::cos(0.11 * u) * std::cos(0.13 * v) + 0.344 * std::cos(0.43 * u + 1) * std::sin(0.37 * v);
+      const double dv = -0.39 * std::sin(0.11 * u) * std::sin(0.13 * v) + 0.296 * std::sin(0.43 * u + 1) * std::cos(0.37 * v);
+      normals.push_back(Vec3(glm::normalize(Vec3d(-du, -dv, 1))));
+    }
+  const auto at = [cells](int x, int y) { return static_cast<std::uint32_t>(y * (cells + 1) + x); };
+  for (int y = 0; y < cells; ++y)
+    for (int x = 0; x < cells; ++x)
+      for (const std::uint32_t i : {at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y), at(x + 1, y + 1), at(x, y + 1)}) indices.push_back(i);
+  return sceneOf(std::move(positions), std::move(indices), std::move(normals));
+}
+
 }  // namespace lumel

@@ -23,6 +23,9 @@ AtlasFigures measureAtlas(const Atlas& atlas);
 /// One instance of one mesh, with flat normals where `normals` are empty.
 Scene sceneOf(std::vector<Vec3> positions, std::vector<std::uint32_t> indices, std::vector<Vec3> normals = {});
 
+/// One smooth hilly surface of 2 * cells^2 triangles over a square of `side` metres.
+Scene terrain(int cells, double side);
+
 /// buildAtlas with generated charts; fails the test on an error.
 AtlasResult chartsOf(const Scene& scene, float texelsPerMeter, int pageSize = 512);
 
