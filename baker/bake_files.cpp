@@ -6,6 +6,7 @@
 #include "baker/staging.h"
 #include "baker/version.h"
 #include "scene/image_io.h"
+#include "scene/parallel.h"
 
 namespace lumel {
 namespace {
@@ -42,20 +43,38 @@ std::map<std::string, std::string> pageMetadata(std::size_t page, const std::str
   return metadata;
 }
 
-Expected<void> writePage(Staging& staging, std::size_t page, const BakedPage& baked, const BakeRecord& record) {
+/// One image of a bake on its way to its file.
+struct ImageFile {
+  fs::path file;
+  const Image* image;
+  WriteImageOptions options;
+};
+
+void addPage(Staging& staging, std::size_t page, const BakedPage& baked, const BakeRecord& record,
+             std::vector<ImageFile>& files) {
   WriteImageOptions options;
   options.format = record.half ? PixelFormat::Half : PixelFormat::Float;
-  const auto write = [&](const std::string& kind, const Image& image) {
+  const auto add = [&](const std::string& kind, const Image& image) {
     options.metadata = pageMetadata(page, kind, record);
-    return writeImage(staging.file(pageFileName(page, kind)), image, options);
+    files.push_back({staging.file(pageFileName(page, kind)), &image, options});
   };
-  for (std::size_t i = 0; i < 3; ++i)
-    if (auto done = write("rnm" + std::to_string(i), baked.rnm[i]); !done) return done;
-  if (auto done = write("flat", baked.flat); !done) return done;
+  for (std::size_t i = 0; i < 3; ++i) add("rnm" + std::to_string(i), baked.rnm[i]);
+  add("flat", baked.flat);
   // Sample counts and coverage are exact in float only.
   options.format = PixelFormat::Float;
   options.channelNames = {"coverage", "validity", "stderr", "samples"};
-  return write("aux", baked.aux);
+  add("aux", baked.aux);
+}
+
+/// Compression takes most of the time, and a file at a time leaves cores idle.
+Expected<void> writeImages(const std::vector<ImageFile>& files) {
+  std::vector<Expected<void>> done(files.size());
+  parallelFor(files.size(), 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) done[i] = writeImage(files[i].file, *files[i].image, files[i].options);
+  });
+  for (Expected<void>& d : done)
+    if (!d) return std::move(d);
+  return {};
 }
 
 }  // namespace
@@ -68,8 +87,10 @@ Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasRes
                          const BakeRecord& record) {
   auto staging = Staging::make(dir);
   if (!staging) return staging.error();
+  std::vector<ImageFile> files;
   for (std::size_t page = 0; page < result.pages.size(); ++page)
-    if (auto done = writePage(*staging, page, result.pages[page], record); !done) return done;
+    addPage(*staging, page, result.pages[page], record, files);
+  if (auto done = writeImages(files); !done) return done;
   if (!scene.environment.isBlack() && !scene.environment.image.empty())
     if (auto done = writeImage(staging->file("sky.exr"), scene.environment.image); !done) return done;
   const auto glb = encodeGlb(scene, atlas.atlas);
