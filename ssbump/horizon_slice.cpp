@@ -71,6 +71,7 @@ std::vector<NearStep> nearSteps(double ux, double uy, int reach, std::ptrdiff_t 
   std::stable_sort(crossings.begin(), crossings.end(),
                    [](const Crossing& a, const Crossing& b) { return a.distance < b.distance; });
   std::vector<NearStep> steps;
+  steps.reserve(crossings.size());
   for (const Crossing& c : crossings) steps.push_back(c.step);
   return steps;
 }

@@ -29,6 +29,15 @@ void maxRow(const float* row, int width, bool wrap, int x0, std::span<float> out
   }
 }
 
+/// The cells at the edge of a map that does not tile may have their centre beyond it: the edge goes on to their end.
+/// `end` is the place in `row` behind the map's last column.
+void extendToCell(std::vector<float>& row, int end, int count) {
+  const int size = static_cast<int>(row.size());
+  if (end < 1 || end > size) return;
+  for (int i = end; i < std::min(size, end + count); ++i)
+    row[static_cast<std::size_t>(i)] = row[static_cast<std::size_t>(end - 1)];
+}
+
 }  // namespace
 
 RowMaxima::RowMaxima(const HeightField& field) : field_(field) {
@@ -137,6 +146,7 @@ FarLevel::FarLevel(const RowMaxima& rows, const TexelRect& tile, const WindowGri
       phases_(cell_ / spacingX_) {
   const int windowX = along == Along::X ? grid.length : grid.across(),
             windowY = along == Along::X ? grid.across() : grid.length;
+  const HeightField& field = rows.field();
   const auto up = [&](int length) { return (length + cell_ - 1) / cell_ * cell_; };
   x0_ = tile.x - up(range);
   y0_ = tile.y - up(range);
@@ -150,7 +160,9 @@ FarLevel::FarLevel(const RowMaxima& rows, const TexelRect& tile, const WindowGri
     std::vector<float> wide(columns + static_cast<std::size_t>(windowX - 1));
     for (std::size_t r = begin; r < end; ++r) {
       const int y = y0_ + static_cast<int>(r) * spacingY_ - windowY / 2;
-      rows.band(y, y + windowY, x0_ - windowX / 2, wide);
+      const bool below = !field.wrap && y >= field.height && y < up(field.height);
+      rows.band(below ? field.height - 1 : y, y + windowY, x0_ - windowX / 2, wide);
+      if (!field.wrap) extendToCell(wide, field.width - (x0_ - windowX / 2), up(field.width) - field.width);
       for (int step = 1; step < windowX; step *= 2)
         for (std::size_t i = 0; i + static_cast<std::size_t>(step) < wide.size(); ++i)
           wide[i] = std::max(wide[i], wide[i + static_cast<std::size_t>(step)]);

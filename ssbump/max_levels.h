@@ -85,7 +85,7 @@ struct WindowGrid {
 class FarLevel {
  public:
   /// Covers offsets up to `range` texels from the tile. The tile begins at a multiple of the cell; behind every entry
-  /// `padding` more can be read.
+  /// `padding` more can be read. Where a map does not tile, its last column and row go on to the end of their cells.
   FarLevel(const RowMaxima& rows, const TexelRect& tile, const WindowGrid& grid, Along along, int range, int padding);
 
   /// The entry at (x, y), multiples of the spacings; the next float is the entry a cell to the right.

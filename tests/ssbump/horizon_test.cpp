@@ -153,6 +153,20 @@ TEST(Horizon, LoneWallsAreNearTheirSlopeAtEveryDistance) {
   }
 }
 
+TEST(Horizon, FarWallsStandOnNarrowMapsToo) {
+  for (int width : {1, 3, 17, 40})
+    for (int distance : {70, 150, 300, 522, 1000}) {
+      const float wall = 0.5f * static_cast<float>(distance);
+      const HeightField field =
+          fields::make(width, 1100, false, [&](int, int y) { return 1050 - y >= distance ? wall : 0.0f; });
+      const std::array<Lobe, 1> lobes{ambientLobe()};
+      for (int x : {0, width / 2, width - 1}) {
+        const Image o = Horizon(field, {.azimuths = 1, .reach = 1100}).occlusion({x, 1050, 1, 1}, lobes);
+        EXPECT_NEAR(std::sqrt(1 / static_cast<double>(o.at(0, 0)[0]) - 1), 0.5, 0.035) << width << " " << distance;
+      }
+    }
+}
+
 TEST(Horizon, DirectionsAreThoseOfTheImage) {
   // Something tall to the right hides B0 most; above (smaller y) B1; below B2.
   const auto post = [](int px, int py) {
