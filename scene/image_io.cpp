@@ -34,8 +34,7 @@ bool storesPalette(const OIIO::ImageSpec& spec, std::string_view format, const H
 
 Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& name, const Head& head) {
   const OIIO::ImageSpec& spec = input.spec();
-  if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0)
-    return inputError(name + ": the image has no pixels");
+  if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0) return inputError(name + ": the image has no pixels");
   if (spec.width > kMaxDimension || spec.height > kMaxDimension)
     return inputError(name + ": " + std::to_string(spec.width) + "x" + std::to_string(spec.height) +
                       " pixels; at most " + std::to_string(kMaxDimension) + " on a side are read");
@@ -116,8 +115,9 @@ Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std
       const bool written = std::fwrite(encoded.data(), 1, encoded.size(), f) == encoded.size();
       std::fclose(f);
       input = written ? OIIO::ImageInput::open(file.string(), &config) : nullptr;
-      auto result = input ? readOpened(*input, name, head)
-                          : Expected<LoadedImage>(inputError(name + ": not an image that can be read: " + OIIO::geterror()));
+      auto result =
+          input ? readOpened(*input, name, head)
+                : Expected<LoadedImage>(inputError(name + ": not an image that can be read: " + OIIO::geterror()));
       std::error_code ec;
       std::filesystem::remove(file, ec);
       return result;
@@ -128,21 +128,18 @@ Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std
 }
 
 struct ImageWriter::State {
-  std::filesystem::path file, temporary;
+  explicit State(const std::filesystem::path& file) : pending(file) {}
+  PendingFile pending;
   std::unique_ptr<OIIO::ImageOutput> output;
   OIIO::ImageSpec spec;
   PixelFormat format = PixelFormat::Float;
   int width = 0, height = 0, channels = 0, nextRow = 0;
-  bool committed = false;
+  bool complete = false;
 
-  std::string name() const { return file.string(); }
+  std::string name() const { return pending.file().string(); }
   Error failed(const std::string& why) const { return failure(name() + ": cannot be written: " + why); }
   ~State() {
-    if (committed) return;
-    if (nextRow > 0) output->close();
-    output.reset();
-    std::error_code ec;
-    std::filesystem::remove(temporary, ec);
+    if (!complete && nextRow > 0) output->close();
   }
 };
 
@@ -158,7 +155,7 @@ Expected<ImageWriter> ImageWriter::open(const std::filesystem::path& file, int w
                               : options.format == PixelFormat::U16  ? OIIO::TypeDesc::UINT16
                               : options.format == PixelFormat::Half ? OIIO::TypeDesc::HALF
                                                                     : OIIO::TypeDesc::FLOAT;
-  auto state = std::make_unique<State>();
+  auto state = std::make_unique<State>(file);
   state->output = OIIO::ImageOutput::create(name);
   if (!state->output) return usageError(name + ": unknown image type; use .exr, .png, .tga, .tif or .hdr");
   OIIO::ImageSpec spec(width, height, channels, type);
@@ -170,9 +167,6 @@ Expected<ImageWriter> ImageWriter::open(const std::filesystem::path& file, int w
     spec.attribute("DateTime", "");
   }
   for (const auto& [key, value] : options.metadata) spec.attribute(key, value);
-  state->file = file;
-  state->temporary = file.parent_path() / ("." + file.stem().string() + "." + std::to_string(getpid()) + ".part" +
-                                           file.extension().string());
   state->format = options.format;
   state->width = width;
   state->height = height;
@@ -180,7 +174,7 @@ Expected<ImageWriter> ImageWriter::open(const std::filesystem::path& file, int w
   state->spec = std::move(spec);
   // The encoder opens with the first rows (libpng complains aloud about a file without any), so try the place itself
   // now.
-  std::FILE* trial = std::fopen(state->temporary.c_str(), "wb");
+  std::FILE* trial = std::fopen(state->pending.temporary().c_str(), "wb");
   if (!trial) return state->failed(std::strerror(errno));
   std::fclose(trial);
   return ImageWriter(std::move(state));
@@ -200,7 +194,7 @@ Expected<void> ImageWriter::write(const Image& rows) {
     if (s.format == PixelFormat::Half && std::abs(v) > 65504.0f)
       return failure(where() + " is " + std::to_string(v) + ", beyond half's 65504; write float");
   }
-  if (s.nextRow == 0 && !s.output->open(s.temporary.string(), s.spec)) return s.failed(s.output->geterror());
+  if (s.nextRow == 0 && !s.output->open(s.pending.temporary().string(), s.spec)) return s.failed(s.output->geterror());
   const bool whole = s.nextRow == 0 && rows.height == s.height;
   const bool written = whole ? s.output->write_image(OIIO::TypeDesc::FLOAT, rows.pixels.data())
                              : s.output->write_scanlines(s.nextRow, s.nextRow + rows.height, 0, OIIO::TypeDesc::FLOAT,
@@ -210,15 +204,18 @@ Expected<void> ImageWriter::write(const Image& rows) {
   return {};
 }
 
-Expected<void> ImageWriter::commit() {
+Expected<PendingFile> ImageWriter::finish() {
   State& s = *state_;
-  LUMEL_CHECK(s.nextRow == s.height);
+  LUMEL_CHECK(s.nextRow == s.height && !s.complete);
+  s.complete = true;
   if (!s.output->close()) return s.failed(s.output->geterror());
-  std::error_code ec;
-  std::filesystem::rename(s.temporary, s.file, ec);
-  if (ec) return s.failed(ec.message());
-  s.committed = true;
-  return {};
+  return std::move(s.pending);
+}
+
+Expected<void> ImageWriter::commit() {
+  auto pending = finish();
+  if (!pending) return pending.error();
+  return putInPlace({&*pending, 1});
 }
 
 Expected<void> writeImage(const std::filesystem::path& file, const Image& image, const WriteImageOptions& options) {

@@ -12,6 +12,7 @@
 
 #include "scene/expected.h"
 #include "scene/image.h"
+#include "scene/pending_file.h"
 
 namespace lumel {
 
@@ -62,6 +63,8 @@ class ImageWriter {
   Expected<void> write(const Image& rows);
   /// Completes the file and puts it in place. Every row must have been written.
   Expected<void> commit();
+  /// Completes the file under its temporary name, to be put in place with others.
+  Expected<PendingFile> finish();
 
  private:
   struct State;
@@ -73,8 +76,6 @@ class ImageWriter {
 Expected<std::vector<std::uint8_t>> encodePng(const Image& image);
 
 inline float srgbToLinear(float c) { return c <= 0.04045f ? c / 12.92f : std::pow((c + 0.055f) / 1.055f, 2.4f); }
-inline float linearToSrgb(float c) {
-  return c <= 0.0031308f ? 12.92f * c : 1.055f * std::pow(c, 1.0f / 2.4f) - 0.055f;
-}
+inline float linearToSrgb(float c) { return c <= 0.0031308f ? 12.92f * c : 1.055f * std::pow(c, 1.0f / 2.4f) - 0.055f; }
 
 }  // namespace lumel

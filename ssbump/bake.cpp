@@ -123,7 +123,9 @@ class Occluder {
       return self;
     }
     if (field.texels.size() > kMostRayTexels)
-      return usageError("--method rays holds about 200 bytes per texel and stops at 4096x4096; use --method horizon");
+      return usageError(
+          "--method rays holds the triangles of the whole map, about 200 bytes per texel, and stops at "
+          "4096x4096; use --method horizon, which runs in tiles");
     auto built = RayOcclusion::build(field, settings.rays);
     if (!built) return built.error();
     self.rays_.emplace(std::move(*built));

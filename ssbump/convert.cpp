@@ -123,7 +123,9 @@ Expected<void> convertMap(const std::filesystem::path& input, const std::filesys
                                 loaded->channelNames, metadata);
   if (!writer) return writer.error();
   if (auto done = writer->write(image); !done) return done;
-  return writer->commit();
+  std::vector<PendingFile> files;
+  if (auto done = writer->finish(files); !done) return done;
+  return putInPlace(files);
 }
 
 }  // namespace lumel::ssbump

@@ -99,17 +99,16 @@ std::vector<std::uint8_t> encodeLevel(const Image& image, DdsFormat format) {
 
 }  // namespace
 
-Expected<void> writeDds(const std::filesystem::path& file, std::span<const Image> levels, DdsFormat format,
-                        const std::string& note) {
+Expected<PendingFile> writeDds(const std::filesystem::path& file, std::span<const Image> levels, DdsFormat format,
+                               const std::string& note) {
   LUMEL_CHECK(!levels.empty());
   const std::string name = file.string();
   for (const Image& level : levels)
     for (float v : level.pixels)
       if (std::isnan(v) || (format == DdsFormat::Rgba16Half && std::abs(v) > 65504.0f))
         return failure(name + ": a value is not a number or beyond half's 65504");
-  const auto temporary =
-      file.parent_path() / ("." + file.stem().string() + "." + std::to_string(getpid()) + ".part.dds");
-  std::FILE* out = std::fopen(temporary.c_str(), "wb");
+  PendingFile pending(file);
+  std::FILE* out = std::fopen(pending.temporary().c_str(), "wb");
   if (!out) return failure(name + ": cannot be written: " + std::strerror(errno));
   const auto put = [&](const std::vector<std::uint8_t>& bytes) {
     return std::fwrite(bytes.data(), 1, bytes.size(), out) == bytes.size();
@@ -118,12 +117,8 @@ Expected<void> writeDds(const std::filesystem::path& file, std::span<const Image
   for (const Image& level : levels) good = good && put(encodeLevel(level, format));
   const int problem = errno;
   good = std::fclose(out) == 0 && good;
-  std::error_code ec;
-  if (good) std::filesystem::rename(temporary, file, ec);
-  if (good && !ec) return {};
-  const std::string why = ec ? ec.message() : std::strerror(problem);
-  std::filesystem::remove(temporary, ec);
-  return failure(name + ": cannot be written: " + why);
+  if (!good) return failure(name + ": cannot be written: " + std::strerror(problem));
+  return pending;
 }
 
 }  // namespace lumel::ssbump

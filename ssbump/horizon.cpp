@@ -2,214 +2,146 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "scene/check.h"
 #include "scene/parallel.h"
+#include "ssbump/horizon_slice.h"
 
 namespace lumel::ssbump {
 namespace {
 
-// Measured against 16k rays on fractal, brick and step fields of amplitudes 8 to 64. Sharp steps need the 12 texels
-// (with 4 their error doubles); 16 steps per octave gain a tenth over 12 for a fifth more time, 8 cost brick joints a
-// third; beyond 384 texels, where slopes are small, half as many lose nothing.
-constexpr double kExactReach = 12;  // up to here every edge that the slice crosses is looked at
-constexpr int kUnitReach = 24;      // up to here every crossing along the dominant axis
-constexpr int kFineReach = 384;     // up to here 12 steps per octave, beyond 6: maxima over windows as long as the step
-// Where in its window a maximum is taken to be, from the centre, in lengths: a rising slope has it at the far end. A
-// quarter leaves a mean error below 5e-4 on fractals and steps of amplitude 24 (0: darker, 1/2: steps too bright).
-constexpr double kWindowEnd = 0.25;
-// A block of texels goes through all azimuths before the next: what its far steps read stays in the second cache.
+// A block of texels goes through all azimuths before the next: what it reads stays in the second cache. Blocks lie at
+// multiples of their size in the map, so that cells do.
 constexpr int kBlockWidth = 2 * kHorizonBlock, kBlockHeight = 32;
-constexpr std::size_t kStepsPerGroup = 12;  // between the kernel's looks at whether anything higher can come
 
-struct LerpStep {
-  int ax, ay, bx, by;  // the two vertices of the crossed edge
-  float fraction, inverseDistance;
+constexpr std::size_t kAzimuthsAtOnce = 2;
+
+int roundUp(int value, int step) { return (value + step - 1) / step * step; }
+int roundDown(int value, int step) { return value / step * step; }
+
+/// One octave's heights of cells and windows along both axes.
+struct OctaveLevels {
+  OctaveLevels(const RowMaxima& rows, const TexelRect& tile, const Octave& octave)
+      : grid(octave.grid),
+        along{FarLevel(rows, tile, grid, Along::X, 2 * octave.begin + 2 * grid.length, kCellBlock),
+              FarLevel(rows, tile, grid, Along::Y, 2 * octave.begin + 2 * grid.length, kCellBlock)} {
+    if (grid.cell > 1) cells = std::make_unique<CellHeights>(rows.field(), tile, grid.cell, kCellBlock);
+  }
+  WindowGrid grid;
+  FarLevel along[2];
+  std::unique_ptr<CellHeights> cells;  // absent: cells are texels
 };
 
-struct BoxStep {
-  int level, x, y;
-  float inverseDistance;
+/// What all blocks of a tile share.
+struct Tile {
+  const RowMaxima& rows;
+  TexelRect rect, blocks;  // blocks: the rectangle of whole blocks around it
+  NearHeights heights;
+  std::vector<OctaveLevels> octaves;  // outwards
+  std::vector<Slice> slices;
 };
 
-/// Distances (along the dominant axis) from begin to twice that, in steps of one window.
-struct Octave {
-  int begin, window;
-  int steps() const { return begin / window; }
-};
-
-std::vector<Octave> octavesTo(int reach) {
-  std::vector<Octave> octaves;
-  for (int begin = kUnitReach; begin < reach; begin *= 2)
-    octaves.push_back({begin, begin < kFineReach ? begin / 12 : begin / 6});
-  return octaves;
-}
-
-/// The level of an octave's windows: level 0 holds the heights, then come windows along x and along y for each octave.
-int levelOf(std::size_t octave, Along along) { return 1 + 2 * static_cast<int>(octave) + (along == Along::Y ? 1 : 0); }
-
-/// Steps sorted by distance, in groups of kStepsPerGroup.
-template <class Step>
-std::vector<StepGroup> groupsOf(const std::vector<Step>& steps) {
-  std::vector<StepGroup> groups;
-  for (std::size_t s = 0; s < steps.size(); s += kStepsPerGroup)
-    groups.push_back({std::min(steps.size(), s + kStepsPerGroup), steps[s].inverseDistance});
-  return groups;
-}
-
-struct Slice {
-  std::vector<LerpStep> lerps;
-  std::vector<BoxStep> boxes;
-  std::vector<float> fraction, lerpInverse, boxInverse;  // of the steps above, for the kernel
-  std::vector<StepGroup> lerpGroups, boxGroups;
-  std::vector<LobeSlice> lobes;
-
-  void finish() {
-    for (const LerpStep& s : lerps) fraction.push_back(s.fraction), lerpInverse.push_back(s.inverseDistance);
-    for (const BoxStep& s : boxes) boxInverse.push_back(s.inverseDistance);
-    lerpGroups = groupsOf(lerps);
-    boxGroups = groupsOf(boxes);
+/// The cells of one octave in a block, on one azimuth: what they ask for and what they are told.
+struct Stage {
+  Stage(const OctaveLevels& levels, int x, int y) : octave(levels) {
+    const int cell = octave.grid.cell;
+    cells.rows = kBlockHeight / cell;
+    cells.columns = std::max(kCellBlock, kBlockWidth / cell);
+    if (!octave.cells) return;  // texels: the kernel has their heights and keeps their slopes
+    cells.lowest = octave.cells->lowest(x, y);
+    cells.highest = octave.cells->highest(x, y);
+    cells.heightStride = octave.cells->rowStride();
+    slopes.resize(static_cast<std::size_t>(cells.rows * cells.columns + kCellBlock));
+    changes.resize(slopes.size());
+    cells.slopes = slopes.data();
+    cells.changes = changes.data();
   }
-};
 
-/// The point `distance` along the slice, on the edge from floor to floor + (ex, ey).
-LerpStep crossing(double x, double y, int ex, int ey, double distance) {
-  // On an x-line x is whole and y is not, and so on: round what is whole, floor what is not.
-  int ax, ay;
-  double fraction;
-  if (ex == 0) {
-    ax = static_cast<int>(std::lround(x));
-    ay = static_cast<int>(std::floor(y));
-    fraction = y - ay;
-  } else {
-    ax = static_cast<int>(std::floor(x));
-    fraction = x - ax;
-    ay = ey == 0 ? static_cast<int>(std::lround(y)) : ax + static_cast<int>(std::lround(y - x));
-  }
-  int bx = ax + ex, by = ay + ey;
-  if (fraction > 1 - 1e-6) {
-    ax = bx;
-    ay = by;
-    fraction = 0;
-  }
-  if (fraction < 1e-6) {
-    bx = ax;
-    by = ay;
-    fraction = 0;
-  }
-  return {ax, ay, bx, by, static_cast<float>(fraction), static_cast<float>(1 / distance)};
-}
-
-Slice makeSlice(double phi, int reach, std::span<const Octave> octaves, std::span<const Lobe> lobes) {
-  Slice slice;
-  const double ux = std::cos(phi), uy = -std::sin(phi);  // image rows run down, b points up
-  const auto addLines = [&](double speed, int ex, int ey, double from, double to) {
-    if (std::abs(speed) < 1e-9) return;
-    for (int k = 1;; ++k) {
-      const double d = k / std::abs(speed);
-      if (d > to + 1e-9) break;
-      if (d > from + 1e-9) slice.lerps.push_back(crossing(d * ux, d * uy, ex, ey, d));
+  /// The block at (x, y) is to look along a slice.
+  void aim(Along along, std::span<const FarStep> steps, int x, int y) {
+    const FarLevel& level = octave.along[along == Along::X ? 0 : 1];
+    windows.clear();
+    inverses.clear();
+    for (const FarStep& step : steps) {
+      windows.push_back(level.at(x + step.x, y + step.y));
+      inverses.push_back(step.inverseDistance);
     }
-  };
-  const double exact = std::min<double>(kExactReach, reach);
-  addLines(ux, 0, 1, 0, exact);
-  addLines(uy, 1, 0, 0, exact);
-  addLines(ux - uy, 1, 1, 0, exact);
-  // Nearest first, so that a group ends where the next begins.
-  std::stable_sort(slice.lerps.begin(), slice.lerps.end(),
-                   [](const LerpStep& a, const LerpStep& b) { return a.inverseDistance > b.inverseDistance; });
-  const bool alongX = std::abs(ux) >= std::abs(uy);
-  const double major = alongX ? ux : uy, minor = alongX ? uy : ux;
-  addLines(major, alongX ? 0 : 1, alongX ? 1 : 0, exact, std::min<double>(kUnitReach / std::abs(major), reach));
-
-  for (std::size_t o = 0; o < octaves.size(); ++o) {
-    const auto [begin, window] = octaves[o];
-    for (int j = 0; j < octaves[o].steps(); ++j) {
-      // The window covers the whole steps begin + j window + 1 ... begin + (j + 1) window along the dominant axis,
-      // about its centre; its highest texel may be anywhere in it.
-      const double centre = begin + j * window + (window + 1) / 2.0;
-      const double distance = (centre + kWindowEnd * window) / std::abs(major);
-      if (centre / std::abs(major) > reach) break;
-      // Windows of even width about p reach from p - width / 2: their centre lies half a texel lower.
-      const int p = static_cast<int>(std::lround(std::copysign(centre, major) + 0.5));
-      const double across = centre * minor / std::abs(major);
-      const int m = static_cast<int>(std::lround(across + (MaxLevel::across(window) > 1 ? 0.5 : 0.0)));
-      slice.boxes.push_back(
-          {levelOf(o, alongX ? Along::X : Along::Y), alongX ? p : m, alongX ? m : p, static_cast<float>(1 / distance)});
-    }
+    cells.windows = windows;
+    cells.windowStride = level.cellRowStride();
+    cells.inverseDistances = inverses;
   }
-  slice.finish();
-  for (const Lobe& lobe : lobes) slice.lobes.emplace_back(lobe, phi);
-  return slice;
-}
 
-/// One block of texels on its way through the azimuths: the sums of its lobes, and where each row finds the heights of
-/// a slice's steps.
+  const OctaveLevels& octave;
+  FarCells cells;
+  std::vector<float> slopes, changes, inverses;
+  std::vector<const float*> windows;
+};
+
+/// One block of texels on its way through the azimuths, a few at a time: their far horizons on cells, from the farthest
+/// in, then their own near ones.
 class Block {
  public:
-  Block(const std::vector<MaxLevel>& levels, const TexelRect& rect, float highest, std::size_t lobeCount)
-      : levels_(levels), rect_(rect), highest_(highest), lobes_(lobeCount) {
-    padded_ = (rect.width + kHorizonBlock - 1) / kHorizonBlock * kHorizonBlock;
-    const auto rows = static_cast<std::size_t>(rect.height), width = static_cast<std::size_t>(padded_);
+  Block(const Tile& tile, int x, int y, std::size_t lobeCount)
+      : tile_(tile), x_(x), y_(y), lobes_(lobeCount), stages_(kAzimuthsAtOnce), near_(kAzimuthsAtOnce) {
+    const TexelRect& rect = tile.rect;
+    firstRow_ = std::max(y, rect.y) - y;
+    firstColumn_ = std::max(0, roundDown(rect.x - x, kHorizonBlock));
+    const int rowCount = std::min(y + kBlockHeight, rect.y + rect.height) - y - firstRow_;
+    const int columnCount = std::min(kBlockWidth, roundUp(rect.x + rect.width - x, kHorizonBlock)) - firstColumn_;
+    const auto width = static_cast<std::size_t>(columnCount), rows = static_cast<std::size_t>(rowCount);
     sums_.resize(rows * lobes_ * width);
     for (std::size_t i = 0; i < rows * lobes_; ++i) sumRows_.push_back(&sums_[i * width]);
-    rows_.resize(rows);
+    for (int r = 0; r < rowCount; ++r)
+      rows_.push_back({tile.heights.at(x + firstColumn_, y + firstRow_ + r),
+                       tile.rows.field().highest - tile.rows.field().lowest,
+                       {},
+                       &sumRows_[static_cast<std::size_t>(r) * lobes_],
+                       firstRow_ + r,
+                       firstColumn_,
+                       columnCount});
+    for (std::vector<Stage>& stages : stages_) {
+      stages.reserve(tile.octaves.size());
+      for (const OctaveLevels& octave : tile.octaves) stages.emplace_back(octave, x, y);
+      for (std::size_t o = 0; o + 1 < stages.size(); ++o) {
+        stages[o].cells.farther = &stages[o + 1].cells;
+        stages[o].cells.fartherIsTwice = stages[o + 1].octave.grid.cell > stages[o].octave.grid.cell;
+      }
+    }
   }
 
-  void add(const Slice& slice, SimdLevel simd) {
-    const std::size_t perRow = 2 * slice.lerps.size() + slice.boxes.size();
-    pointers_.resize(perRow * rows_.size());
-    for (std::size_t r = 0; r < rows_.size(); ++r) rows_[r] = rowOf(slice, static_cast<int>(r), &pointers_[r * perRow]);
-    horizonRows(rows_, simd);
+  void run(SimdLevel simd) {
+    const std::span<const Slice> all = tile_.slices;
+    for (std::size_t first = 0; first < all.size(); first += kAzimuthsAtOnce) {
+      const auto some = all.subspan(first, std::min(kAzimuthsAtOnce, all.size() - first));
+      for (std::size_t s = 0; s < some.size(); ++s) {
+        std::vector<Stage>& stages = stages_[s];
+        for (std::size_t o = stages.size(); o-- > 0;) {
+          stages[o].aim(some[s].along, some[s].far[o], x_, y_);
+          if (o > 0) farCells(stages[o].cells, simd);
+        }
+        near_[s] = {stages.empty() ? FarCells{} : stages[0].cells, some[s].near, some[s].lobes};
+      }
+      for (NearRow& row : rows_) row.slices = {near_.data(), some.size()};
+      nearRows(rows_, simd);
+    }
   }
 
-  float sum(int x, int y, std::size_t lobe) const { return sumRows_[static_cast<std::size_t>(y) * lobes_ + lobe][x]; }
+  /// Of a texel of the map.
+  float sum(int x, int y, std::size_t lobe) const {
+    return sumRows_[static_cast<std::size_t>(y - y_ - firstRow_) * lobes_ + lobe][x - x_ - firstColumn_];
+  }
 
  private:
-  HorizonRow rowOf(const Slice& slice, int r, const float** pointers) const {
-    const int y = rect_.y + r;
-    HorizonRow row;
-    row.own = levels_[0].at(rect_.x, y);
-    const float** a = pointers;
-    const float** b = a + slice.lerps.size();
-    const float** box = b + slice.lerps.size();
-    const std::ptrdiff_t stride = levels_[0].rowStride();
-    for (std::size_t s = 0; s < slice.lerps.size(); ++s) {
-      const LerpStep& step = slice.lerps[s];
-      a[s] = row.own + step.ay * stride + step.ax;
-      b[s] = row.own + step.by * stride + step.bx;
-    }
-    for (std::size_t s = 0; s < slice.boxes.size(); ++s) {
-      const BoxStep& step = slice.boxes[s];
-      box[s] = levels_[static_cast<std::size_t>(step.level)].at(rect_.x + step.x, y + step.y);
-    }
-    row.lerpA = a;
-    row.lerpB = b;
-    row.fraction = slice.fraction.data();
-    row.lerpInverse = slice.lerpInverse.data();
-    row.lerpGroups = slice.lerpGroups.data();
-    row.lerpGroupCount = slice.lerpGroups.size();
-    row.box = box;
-    row.boxInverse = slice.boxInverse.data();
-    row.boxGroups = slice.boxGroups.data();
-    row.boxGroupCount = slice.boxGroups.size();
-    row.highest = highest_;
-    row.slices = slice.lobes.data();
-    row.channels = lobes_;
-    row.sums = &sumRows_[static_cast<std::size_t>(r) * lobes_];
-    row.width = padded_;
-    return row;
-  }
-
-  const std::vector<MaxLevel>& levels_;
-  TexelRect rect_;
-  float highest_;
+  const Tile& tile_;
+  int x_, y_;                   // of the block
+  int firstRow_, firstColumn_;  // of what is wanted of it, columns in whole kernel blocks
   std::size_t lobes_;
-  int padded_;
   std::vector<float> sums_;
   std::vector<float*> sumRows_;  // [row * lobes + lobe]
-  std::vector<const float*> pointers_;
-  std::vector<HorizonRow> rows_;
+  std::vector<NearRow> rows_;
+  std::vector<std::vector<Stage>> stages_;  // [azimuth][octave]; the first octave's cells are texels
+  std::vector<NearSlice> near_;             // per azimuth
 };
 
 }  // namespace
@@ -227,30 +159,32 @@ Horizon::Horizon(const HeightField& field, const HorizonSettings& settings) : se
 }
 
 Image Horizon::occlusion(const TexelRect& rect, std::span<const Lobe> lobes) const {
-  const std::vector<Octave> octaves = octavesTo(settings_.reach);
-  std::vector<Slice> slices;
+  TexelRect blocks{roundDown(rect.x, kBlockWidth), roundDown(rect.y, kBlockHeight), 0, 0};
+  blocks.width = roundUp(rect.x + rect.width, kBlockWidth) - blocks.x;
+  blocks.height = roundUp(rect.y + rect.height, kBlockHeight) - blocks.y;
+  Tile tile{rows_, rect, blocks, NearHeights(rows_, blocks, nearReach() + 1), {}, {}};
+  const std::vector<Octave> octaves = octavesTo(settings_.reach, kBlockHeight);
+  for (const Octave& octave : octaves) tile.octaves.emplace_back(rows_, blocks, octave);
+  for (int j = 0; j < settings_.azimuths; ++j)
+    tile.slices.push_back(
+        makeSlice(sliceAzimuth(j, settings_.azimuths), settings_.reach, octaves, lobes, tile.heights.rowStride()));
+  // One axis after the other: each has levels of its own, which the second cache does not hold together.
+  std::stable_sort(tile.slices.begin(), tile.slices.end(),
+                   [](const Slice& a, const Slice& b) { return a.along < b.along; });
   std::vector<float> open(lobes.size(), 0.0f);  // summed as the kernel sums: flat gives exactly 1
-  for (int j = 0; j < settings_.azimuths; ++j) {
-    slices.push_back(makeSlice(sliceAzimuth(j, settings_.azimuths), settings_.reach, octaves, lobes));
-    for (std::size_t c = 0; c < lobes.size(); ++c) open[c] += slices.back().lobes[c].open;
-  }
-  std::vector<MaxLevel> levels;
-  levels.emplace_back(rows_, rect, 1, Along::X, kUnitReach + 1, kHorizonBlock);
-  for (const Octave& octave : octaves)
-    for (Along along : {Along::X, Along::Y})
-      levels.emplace_back(rows_, rect, octave.window, along, 2 * octave.begin + octave.window, kHorizonBlock);
+  for (const Slice& slice : tile.slices)
+    for (std::size_t c = 0; c < lobes.size(); ++c) open[c] += slice.lobes[c].open;
   Image out(rect.width, rect.height, static_cast<int>(lobes.size()));
-  const int across = (rect.width + kBlockWidth - 1) / kBlockWidth,
-            down = (rect.height + kBlockHeight - 1) / kBlockHeight;
+  const int across = blocks.width / kBlockWidth, down = blocks.height / kBlockHeight;
   parallelFor(static_cast<std::size_t>(across * down), 1, [&](std::size_t first, std::size_t) {
-    const int x0 = static_cast<int>(first) % across * kBlockWidth, y0 = static_cast<int>(first) / across * kBlockHeight;
-    const int w = std::min(kBlockWidth, rect.width - x0), h = std::min(kBlockHeight, rect.height - y0);
-    Block block(levels, {rect.x + x0, rect.y + y0, w, h}, rows_.field().highest, lobes.size());
-    for (const Slice& slice : slices) block.add(slice, settings_.simd);
-    for (int y = 0; y < h; ++y)
-      for (int x = 0; x < w; ++x)
+    const int x0 = blocks.x + static_cast<int>(first) % across * kBlockWidth,
+              y0 = blocks.y + static_cast<int>(first) / across * kBlockHeight;
+    Block block(tile, x0, y0, lobes.size());
+    block.run(settings_.simd);
+    for (int y = std::max(y0, rect.y); y < std::min(y0 + kBlockHeight, rect.y + rect.height); ++y)
+      for (int x = std::max(x0, rect.x); x < std::min(x0 + kBlockWidth, rect.x + rect.width); ++x)
         for (std::size_t c = 0; c < lobes.size(); ++c)
-          out.at(x0 + x, y0 + y)[c] = open[c] > 0 ? std::clamp(block.sum(x, y, c) / open[c], 0.0f, 1.0f) : 1.0f;
+          out.at(x - rect.x, y - rect.y)[c] = open[c] > 0 ? std::clamp(block.sum(x, y, c) / open[c], 0.0f, 1.0f) : 1.0f;
   });
   return out;
 }

@@ -13,7 +13,7 @@
 namespace lumel::ssbump {
 
 struct HorizonSettings {
-  int azimuths = 48;  // >= 1; 4, 12, 20, ... are poor choices: slices run along the cells' diagonals
+  int azimuths = 64;  // >= 1; multiples of 4 are best: no slice then runs along an axis or a diagonal of the map
   int reach = 0;      // texels beyond which nothing occludes; 0 = automaticReach
   SimdLevel simd = bestSimdLevel();
 };

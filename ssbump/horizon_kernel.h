@@ -1,4 +1,4 @@
-// The inner loop of the horizon back end: some rows of texels, one azimuth, in SIMD for the processor at hand.
+// The inner loops of the horizon back end, one azimuth at a time, in SIMD for the processor at hand.
 #pragma once
 
 #include <cstddef>
@@ -8,41 +8,52 @@
 
 namespace lumel::ssbump {
 
-/// Texels that the kernel handles at once: rows are padded to a multiple of this.
+/// Rows that the kernel walks are padded to a multiple of this.
 inline constexpr int kHorizonBlock = 64;
+/// So are rows of cells, and a row of cells can be read so far past its end.
+inline constexpr int kCellBlock = 32;
 
-/// A slope rising by this, a quarter of a degree, is not looked for any more: at worst, missed all around, 0.002 of the
-/// visibility; measured, less than 1e-4.
-inline constexpr float kSlopeThatMatters = 0.004f;
-
-/// Steps that begin at one distance. They count for a texel only if the highest point of the field could raise its
-/// slope there by kSlopeThatMatters: (highest - own height) * inverse - slope exceeds that.
-struct StepGroup {
-  std::size_t end = 0;  // one past the group's last step
-  float inverse = 0;    // 1 / the least distance of its steps
+/// A point on the edge between two vertices: height = a + fraction * (b - a).
+struct NearStep {
+  std::ptrdiff_t a = 0, b = 0;  // offsets of the two vertices from the texel's own
+  float fraction = 0, inverseDistance = 0;
 };
 
-/// One azimuth of one row. Slopes are (height at the step - own height) * inverse distance.
-struct HorizonRow {
-  const float* own = nullptr;  // heights of the row's texels
-  // Steps between two vertices: height = near[s] + fraction[s] * (far[s] - near[s]).
-  const float* const* lerpA = nullptr;
-  const float* const* lerpB = nullptr;
-  const float* fraction = nullptr;
-  const float* lerpInverse = nullptr;
-  const StepGroup* lerpGroups = nullptr;
-  std::size_t lerpGroupCount = 0;
-  // Steps that are one box maximum.
-  const float* const* box = nullptr;
-  const float* boxInverse = nullptr;
-  const StepGroup* boxGroups = nullptr;
-  std::size_t boxGroupCount = 0;
-  float highest = 0;  // of the whole field
+/// The far horizon of cells of texels. Each slope (H - h) / d falls linearly with the own height h, so the horizon, the
+/// highest of them, is convex in h: known at a cell's lowest and highest texel, the chord between is at most too high,
+/// and exact wherever one occluder rules.
+struct FarCells {
+  int rows = 0, columns = 0;  // columns: a multiple of kCellBlock
+  const float* lowest = nullptr;
+  const float* highest = nullptr;
+  std::ptrdiff_t heightStride = 0;
+  // Steps: the maximum that cell (0, 0) sees; the cells a row below and to the right see those stride and 1 further.
+  std::span<const float* const> windows;
+  std::ptrdiff_t windowStride = 0;
+  std::span<const float> inverseDistances;
+  // What lies farther still, of cells as large or twice as large; null: nothing.
+  const FarCells* farther = nullptr;
+  bool fartherIsTwice = false;
+  // Out, rows x columns: the slope at the lowest texel, and its change per height.
+  float* slopes = nullptr;
+  float* changes = nullptr;
+};
 
-  const LobeSlice* slices = nullptr;  // one per channel
-  std::size_t channels = 0;
-  float* const* sums = nullptr;  // one row per channel: += F(horizon slope)
-  int width = 0;                 // a multiple of kHorizonBlock
+/// One azimuth of some rows of texels. Slopes are (height at the step - own height) * inverse distance.
+struct NearSlice {
+  FarCells texels;                   // where cells are texels; their lowest and highest and what is out are not used
+  std::span<const NearStep> steps;   // nearest first
+  std::span<const LobeSlice> lobes;  // one per channel
+};
+
+/// One row of texels.
+struct NearRow {
+  const float* own = nullptr;         // heights
+  float highest = 0;                  // at least that of any step of the row's texels
+  std::span<const NearSlice> slices;  // a few neighbouring azimuths: their sums are fetched once
+  float* const* sums = nullptr;       // one row per channel: += F(horizon slope)
+  int row = 0, column = 0;            // of the first texel, among the slices' texels
+  int width = 0;                      // a multiple of kHorizonBlock
 };
 
 enum class SimdLevel { Baseline, Avx2, Avx512 };
@@ -50,8 +61,9 @@ enum class SimdLevel { Baseline, Avx2, Avx512 };
 /// The best that this processor runs. Every level gives the same bits.
 SimdLevel bestSimdLevel();
 
-/// All rows block by block, so that the rows' common neighbourhood stays in the first cache. Rows of one azimuth, one
-/// width, one set of groups and lobes.
-void horizonRows(std::span<const HorizonRow> rows, SimdLevel level);
+void farCells(const FarCells& cells, SimdLevel level);
+
+/// All rows block by block, so that the rows' common neighbourhood stays in the first cache. Rows of one width.
+void nearRows(std::span<const NearRow> rows, SimdLevel level);
 
 }  // namespace lumel::ssbump

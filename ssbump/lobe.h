@@ -46,7 +46,9 @@ struct LobeSlice {
   double above(double t) const;
 };
 
-/// Azimuth j of count: 2 pi (j + 1/2) / count, so that no slice lies on an axis of the height map.
-inline double sliceAzimuth(int j, int count) { return 2 * std::numbers::pi * (j + 0.5) / count; }
+/// Azimuth j of count: 2 pi (j + 1/4) / count. Slices at 1/4, 3/4, 5/4, ... of their spacing from an axis on one side
+/// lie at 3/4, 7/4, ... on the other: what is alike on both sides of an axis, as joints and walls are, is looked at
+/// twice as finely as with (j + 1/2). With a multiple of 4 no slice lies on an axis or a diagonal of the map.
+inline double sliceAzimuth(int j, int count) { return 2 * std::numbers::pi * (j + 0.25) / count; }
 
 }  // namespace lumel::ssbump

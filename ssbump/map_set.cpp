@@ -206,10 +206,11 @@ Expected<void> MapSet::write(const Image& normals, const Image& occlusion) {
 
 Expected<void> MapSet::commit() {
   LUMEL_CHECK(row_ == height_);
+  std::vector<PendingFile> files;
   for (auto* writer : {&weights_, &occlusion_, &ambient_, &normal_, &recovered_, &ssbump_})
     if (*writer)
-      if (auto done = (*writer)->commit(); !done) return done;
-  return {};
+      if (auto done = (*writer)->finish(files); !done) return done;
+  return putInPlace(files);
 }
 
 std::vector<std::string> MapSet::warnings() const {

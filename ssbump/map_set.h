@@ -48,7 +48,8 @@ class MapSet {
 
   /// The next rows: unit normals (t, b, n) in three channels, visibility in lobes().size() channels.
   Expected<void> write(const Image& normals, const Image& occlusion);
-  /// Puts every file in place. Before it nothing is visible, and nothing is left if it is not reached.
+  /// Completes every file, then puts all in place; if one cannot be, none is replaced. Before it nothing is visible,
+  /// and nothing is left if it is not reached.
   Expected<void> commit();
 
   /// "FILE: 12 values above 1 were cut ..." for integer formats.

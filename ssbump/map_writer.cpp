@@ -105,7 +105,7 @@ Expected<void> MapWriter::write(const Image& rows) {
   return stream_ ? stream_->write(rows) : Expected<void>();
 }
 
-Expected<void> MapWriter::commitDds() {
+Expected<PendingFile> MapWriter::finishDds() {
   std::vector<Image> levels = mipLevels(kept_, options_.mipFilter, options_.wrap);
   levels.insert(levels.begin(), std::move(kept_));
   if (kind_ == MapKind::Normals)
@@ -114,17 +114,26 @@ Expected<void> MapWriter::commitDds() {
   return writeDds(file_, levels, ddsFormatFor(options_), note == write_.metadata.end() ? "" : note->second);
 }
 
-Expected<void> MapWriter::commit() {
-  if (!stream_) return commitDds();
+Expected<void> MapWriter::finish(std::vector<PendingFile>& files) {
+  const auto keep = [&](Expected<PendingFile> file) -> Expected<void> {
+    if (!file) return file.error();
+    files.push_back(std::move(*file));
+    return {};
+  };
+  if (!stream_) return keep(finishDds());
   if (options_.mips && (width_ > 1 || height_ > 1)) {
     std::vector<Image> levels = mipLevels(kept_, options_.mipFilter, options_.wrap);
     if (halvesAsItGoes()) levels.insert(levels.begin(), std::move(kept_));
     for (std::size_t i = 0; i < levels.size(); ++i) {
-      if (kind_ == MapKind::Normals) makeUnit(levels[i]);
-      if (auto done = writeImage(mipName(file_, i + 1), levels[i], write_); !done) return done;
+      Image& level = levels[i];
+      if (kind_ == MapKind::Normals) makeUnit(level);
+      auto writer = ImageWriter::open(mipName(file_, i + 1), level.width, level.height, level.channels, write_);
+      if (!writer) return writer.error();
+      if (auto done = writer->write(level); !done) return done;
+      if (auto done = keep(writer->finish()); !done) return done;
     }
   }
-  return stream_->commit();
+  return keep(stream_->finish());
 }
 
 }  // namespace lumel::ssbump

@@ -1,4 +1,4 @@
-// One output map: rows as they are made, then its mip chain, put in place together when complete.
+// One output map: rows as they are made, then its mip chain.
 #pragma once
 
 #include <filesystem>
@@ -34,7 +34,8 @@ class MapWriter {
   /// The next rows from the top. Memory: a plain map holds no rows; with mips a quarter of the map (box filter, even
   /// sides) or all of it; DDS all of it.
   Expected<void> write(const Image& rows);
-  Expected<void> commit();
+  /// Completes the map's files under their temporary names, and adds them to those to be put in place together.
+  Expected<void> finish(std::vector<PendingFile>& files);
 
   /// Values above 1 or below 0 that an integer format has cut.
   std::size_t clipped() const { return clipped_; }
@@ -42,7 +43,7 @@ class MapWriter {
 
  private:
   bool halvesAsItGoes() const;
-  Expected<void> commitDds();
+  Expected<PendingFile> finishDds();
 
   std::filesystem::path file_;
   int width_ = 0, height_ = 0, channels_ = 0, row_ = 0;

@@ -1,7 +1,6 @@
 #include "ssbump/max_levels.h"
 
 #include <algorithm>
-#include <bit>
 
 #include "scene/parallel.h"
 
@@ -28,6 +27,15 @@ void maxRow(const float* row, int width, bool wrap, int x0, std::span<float> out
       out[static_cast<std::size_t>(i + k)] = std::max(out[static_cast<std::size_t>(i + k)], row[x + k]);
     i += run;
   }
+}
+
+/// The cells at the edge of a map that does not tile may have their centre beyond it: the edge goes on to their end.
+/// `end` is the place in `row` behind the map's last column.
+void extendToCell(std::vector<float>& row, int end, int count) {
+  const int size = static_cast<int>(row.size());
+  if (end < 1 || end > size) return;
+  for (int i = end; i < std::min(size, end + count); ++i)
+    row[static_cast<std::size_t>(i)] = row[static_cast<std::size_t>(end - 1)];
 }
 
 }  // namespace
@@ -85,26 +93,84 @@ void RowMaxima::band(int y0, int y1, int x0, std::span<float> out) const {
   }
 }
 
-MaxLevel::MaxLevel(const RowMaxima& rows, const TexelRect& tile, int length, Along along, int range, int padding)
-    : shift_(std::countr_zero(static_cast<unsigned>(std::max(1, along == Along::X ? across(length) / 2 : length / 4)))),
-      x0_(tile.x - range),
-      width_(tile.width + 2 * range + padding) {
-  const int windowX = along == Along::X ? length : across(length),
-            windowY = along == Along::X ? across(length) : length;
-  firstRow_ = (tile.y - range) >> shift_;
-  const int lastRow = ((tile.y + tile.height + range) >> shift_) + 1;
-  const auto count = static_cast<std::size_t>(lastRow - firstRow_ + 1);
-  const auto width = static_cast<std::size_t>(width_);
+NearHeights::NearHeights(const RowMaxima& rows, const TexelRect& tile, int range)
+    : x0_(tile.x - range), y0_(tile.y - range), width_(tile.width + 2 * range) {
+  const auto count = static_cast<std::size_t>(tile.height + 2 * range), width = static_cast<std::size_t>(width_);
   data_.resize(count * width);
-  parallelFor(count, 8, [&](std::size_t begin, std::size_t end) {
-    std::vector<float> wide(width + static_cast<std::size_t>(windowX - 1));
+  parallelFor(count, 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t r = begin; r < end; ++r) {
-      const int y = ((firstRow_ + static_cast<int>(r)) << shift_) - windowY / 2;
-      rows.band(y, y + windowY, x0_ - windowX / 2, wide);
+      const int y = y0_ + static_cast<int>(r);
+      const std::span<float> row{&data_[r * width], width};
+      rows.band(y, y + 1, x0_, row);
+      for (float& h : row) h -= rows.field().lowest;
+    }
+  });
+}
+
+CellHeights::CellHeights(const HeightField& field, const TexelRect& tile, int cell, int columns)
+    : x0_(tile.x), y0_(tile.y), cell_(cell), width_((tile.width + cell - 1) / cell + columns) {
+  const auto rows = static_cast<std::size_t>((tile.height + cell - 1) / cell), width = static_cast<std::size_t>(width_);
+  lowest_.assign(rows * width, 0.0f);
+  highest_.assign(rows * width, 0.0f);
+  const int right = std::min(tile.x + tile.width, field.width);
+  parallelFor(rows, 8, [&](std::size_t begin, std::size_t end) {
+    std::vector<float> low(static_cast<std::size_t>(tile.width)), high(low.size());
+    for (std::size_t r = begin; r < end; ++r) {
+      const int top = y0_ + static_cast<int>(r) * cell, bottom = std::min(top + cell, field.height);
+      if (top >= bottom) continue;
+      const auto count = static_cast<std::size_t>(right - x0_);
+      std::copy_n(field.row(top) + x0_, count, low.begin());
+      std::copy_n(field.row(top) + x0_, count, high.begin());
+      for (int y = top + 1; y < bottom; ++y) {
+        const float* row = field.row(y) + x0_;
+        for (std::size_t i = 0; i < count; ++i) {
+          low[i] = std::min(low[i], row[i]);
+          high[i] = std::max(high[i], row[i]);
+        }
+      }
+      for (std::size_t i = 0, c = r * width; i < count; i += static_cast<std::size_t>(cell), ++c) {
+        const auto first = static_cast<std::ptrdiff_t>(i),
+                   last = static_cast<std::ptrdiff_t>(std::min(count, i + static_cast<std::size_t>(cell)));
+        lowest_[c] = *std::min_element(low.begin() + first, low.begin() + last) - field.lowest;
+        highest_[c] = *std::max_element(high.begin() + first, high.begin() + last) - field.lowest;
+      }
+    }
+  });
+}
+
+FarLevel::FarLevel(const RowMaxima& rows, const TexelRect& tile, const WindowGrid& grid, Along along, int range,
+                   int padding)
+    : cell_(grid.cell),
+      spacingX_(along == Along::X ? grid.spacingAlong() : grid.spacingAcross()),
+      spacingY_(along == Along::X ? grid.spacingAcross() : grid.spacingAlong()),
+      phases_(cell_ / spacingX_) {
+  const int windowX = along == Along::X ? grid.length : grid.across(),
+            windowY = along == Along::X ? grid.across() : grid.length;
+  const HeightField& field = rows.field();
+  const auto up = [&](int length) { return (length + cell_ - 1) / cell_ * cell_; };
+  x0_ = tile.x - up(range);
+  y0_ = tile.y - up(range);
+  width_ = (up(tile.width) + 2 * up(range)) / cell_ + 1;
+  const int lastRow = (tile.height + up(range) + range) / spacingY_ + 1;
+  const auto count = static_cast<std::size_t>(lastRow + 1), width = static_cast<std::size_t>(width_),
+             phaseCount = static_cast<std::size_t>(phases_), cell = static_cast<std::size_t>(cell_);
+  data_.resize(count * phaseCount * width + static_cast<std::size_t>(padding));
+  const std::size_t columns = width * cell;
+  parallelFor(count, 8, [&](std::size_t begin, std::size_t end) {
+    std::vector<float> wide(columns + static_cast<std::size_t>(windowX - 1));
+    for (std::size_t r = begin; r < end; ++r) {
+      const int y = y0_ + static_cast<int>(r) * spacingY_ - windowY / 2;
+      const bool below = !field.wrap && y >= field.height && y < up(field.height);
+      rows.band(below ? field.height - 1 : y, y + windowY, x0_ - windowX / 2, wide);
+      if (!field.wrap) extendToCell(wide, field.width - (x0_ - windowX / 2), up(field.width) - field.width);
       for (int step = 1; step < windowX; step *= 2)
         for (std::size_t i = 0; i + static_cast<std::size_t>(step) < wide.size(); ++i)
           wide[i] = std::max(wide[i], wide[i + static_cast<std::size_t>(step)]);
-      std::copy(wide.begin(), wide.begin() + static_cast<std::ptrdiff_t>(width), &data_[r * width]);
+      for (std::size_t phase = 0; phase < phaseCount; ++phase) {
+        float* out = &data_[(r * phaseCount + phase) * width];
+        const float* in = &wide[phase * static_cast<std::size_t>(spacingX_)];
+        for (std::size_t i = 0; i < width; ++i) out[i] = in[i * cell] - rows.field().lowest;
+      }
     }
   });
 }

@@ -271,6 +271,30 @@ TEST_F(Maps, ErrorsLeaveNothingBehind) {
   EXPECT_EQ(filesInFolder(), before);
 }
 
+TEST_F(Maps, ASetIsReplacedWholeOrNotAtAll) {
+  const fs::path in = heights(32, 16);
+  const auto bytes = [](const fs::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  };
+  std::ofstream(path("ao.png")) << "an older map";
+  BakeSettings s = settings("out.tga");
+  s.maps.files.ambient = path("ao.png");
+  s.maps.files.normal = path("n.dds");
+  s.maps.options.mips = true;
+  // The last file to be put in place cannot be: a folder stands there.
+  fs::create_directory(path("out.tga"));
+  const auto blocked = bakeHeightMap(in, s, silent_);
+  ASSERT_FALSE(blocked);
+  EXPECT_NE(blocked.error().message.find("out.tga"), std::string::npos) << blocked.error().message;
+  EXPECT_EQ(bytes(path("ao.png")), "an older map");
+  EXPECT_EQ(filesInFolder(), 3u);  // the input, the older map, the folder
+  fs::remove(path("out.tga"));
+  ASSERT_TRUE(bakeHeightMap(in, s, silent_));
+  EXPECT_NE(bytes(path("ao.png")), "an older map");
+  EXPECT_EQ(filesInFolder(), 4u + 2 * 5u);  // the input, three maps, five more levels of two of them
+}
+
 TEST_F(Maps, EmptyAndOneTexelFiles) {
   std::ofstream(path("empty.png"));
   EXPECT_EQ(bakeHeightMap(path("empty.png"), settings("s.png"), silent_).error().kind, ErrorKind::Input);
