@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr int kDilateByPadding = -1;
 
-/// Auto: where --quality asks for less than production.
+/// Auto: for the gather. Path tracing is the reference and stays as it is.
 enum class Denoise { Auto, On, Off };
 /// Least samples where a target error is given and --samples is not: the first at which an error is known well enough.
 constexpr int kLeastSamples = 32;
@@ -49,8 +49,8 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
   options.choice("quality", a.quality, {"draft", "preview", "production"}, "16, 64 or 256 samples");
   options.integer("samples", a.samples, {1, 1 << 24}, "Gather rays per texel; with --target-error the least")
       .defaultText = "by --quality; 32 with --target-error";
-  options.number("target-error", a.bake.targetError, {0.0f, 1.0f},
-                 "Sample each part of a page until the relative standard error of its light is so small (0.01: 1%); "
+  options.share("target-error", a.bake.targetError, {0.0f, 1.0f},
+                 "Sample each part of a page until the relative standard error of its light is so small (1% or 0.01); "
                  "done when 95% of the texels are. Texels darker than a tenth of the mean count as so bright. 0: off, "
                  "the same number of rays everywhere");
   options.integer("max-samples", a.bake.maxSamples, {1, 1 << 24},
@@ -77,8 +77,7 @@ void declareOptions(OptionTable& options, BakeArguments& a) {
   output.required = true;
   options.flag("half", a.half, "Write half floats: half the size, values up to 65504");
   options.choice("denoise", a.denoise, {"auto", "on", "off"},
-                 "Average texels with those around them that agree within their noise; auto: for the qualities draft "
-                 "and preview");
+                 "Average texels with those around them that agree within their noise; auto: with --integrator gather");
   options.integer("dilate", a.dilate, {0, 1024}, "Rings of texels grown around charts; 0: none").defaultText =
       "half of --padding";
   declareOutsidePaths(options, a);
@@ -142,7 +141,7 @@ int samplesOf(const BakeArguments& a) {
 
 bool denoises(const BakeArguments& a) {
   if (a.denoise != Denoise::Auto) return a.denoise == Denoise::On;
-  return a.quality != Quality::Production;
+  return a.bake.integrator == Integrator::Gather;
 }
 
 BakeRecord recordOf(const BakeArguments& a, int dilate, nlohmann::ordered_json settings) {

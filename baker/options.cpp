@@ -147,6 +147,20 @@ Option& OptionTable::number(const std::string& name, float& target, Range<float>
   return add(std::move(o));
 }
 
+Option& OptionTable::share(const std::string& name, float& target, Range<float> range, const std::string& help) {
+  Option& o = number(name, target, range, help);
+  o.set = [&target, range](Texts texts) -> Problem {
+    const std::string& text = texts[0];
+    if (!text.ends_with('%')) return parseIn(text, range, target);
+    float percent = 0.0f;
+    const Range<float> percents{100.0f * range.least, 100.0f * range.most};
+    if (auto problem = parseIn(text.substr(0, text.size() - 1), percents, percent)) return problem;
+    target = percent / 100.0f;
+    return {};
+  };
+  return o;
+}
+
 Option& OptionTable::optionalNumber(const std::string& name, std::optional<float>& target, Range<float> range,
                                     const std::string& help) {
   Option o{.name = name, .placeholder = "X", .help = help};

@@ -57,6 +57,8 @@ class OptionTable {
                         const std::string& help);
   Option& number(const std::string& name, float& target, Range<float> range, const std::string& help);
   /// Empty unless given.
+  /// A number that may also be given as percent: 1% is 0.01.
+  Option& share(const std::string& name, float& target, Range<float> range, const std::string& help);
   Option& optionalNumber(const std::string& name, std::optional<float>& target, Range<float> range,
                          const std::string& help);
   Option& color(const std::string& name, Vec3& target, Range<float> range, const std::string& help);

@@ -69,6 +69,7 @@ TEST(ExitCodes, WrongCommandLineIs2) {
   EXPECT_TRUE(fails(bake({"--sky-color", "1", "-2", "0"}), 2, {"--sky-color", "-2"}));
   EXPECT_TRUE(fails(bake({"--page-size", "30"}), 2, {"--page-size", "multiple of 4"}));
   EXPECT_TRUE(fails(bake({"--projection", "round"}), 2, {"--projection", "raw|flat|fit"}));
+  EXPECT_TRUE(fails(bake({"--target-error", "200%"}), 2, {"--target-error", "200", "0 to 100"}));
   EXPECT_TRUE(fails(bake({"--target-error", "0.1", "--samples", "99", "--max-samples", "64"}), 2,
                     {"--samples 99", "--max-samples 64"}));
   EXPECT_TRUE(fails(bake({"--sky", "x.hdr", "--sky-color", "1", "1", "1"}), 2, {"--sky-color"}));
