@@ -112,34 +112,65 @@ struct Sums {
   std::array<std::vector<float>, kColors> colors;
 };
 
-/// Adds to every texel of the band the one that lies (dx, dy) from it, as far as their patches agree.
-void addShifted(const Band& band, std::ptrdiff_t dx, std::ptrdiff_t dy, std::size_t width, Sums& sums) {
-  const std::ptrdiff_t shift = dy * static_cast<std::ptrdiff_t>(band.stride) + dx;
-  const Differences empty{std::vector<float>(width + 2 * kPatch), std::vector<float>(width + 2 * kPatch)};
-  Differences raw = empty;
-  std::array<Differences, 3> ring = {empty, empty, empty};
-  std::vector<float> weights(width);
-  const auto ringRow = [&](std::ptrdiff_t row) -> Differences& { return ring[static_cast<std::size_t>(row + 3) % 3]; };
-  differencesOfRow(band, -1, shift, width, raw, ringRow(-1));
-  differencesOfRow(band, 0, shift, width, raw, ringRow(0));
-  for (std::ptrdiff_t row = 0; row < static_cast<std::ptrdiff_t>(band.rows); ++row) {
-    differencesOfRow(band, row + 1, shift, width, raw, ringRow(row + 1));
-    const std::size_t here = band.at(row, 0);
-    const std::uint32_t* chart = band.charts.data() + here;
-    for (std::size_t x = 0; x < width; ++x) {
-      const float distance = ring[0].distance[x] + ring[1].distance[x] + ring[2].distance[x];
-      const float comparable = ring[0].comparable[x] + ring[1].comparable[x] + ring[2].comparable[x];
+/// How far the patches around texels of one row and those `shift` from them agree, 0 to 1; called row by row.
+class Agreement {
+ public:
+  Agreement(const Band& band, std::ptrdiff_t shift, std::size_t width) : band_(band), shift_(shift), width_(width) {
+    const Differences empty{std::vector<float>(width + 2 * kPatch), std::vector<float>(width + 2 * kPatch)};
+    raw_ = empty;
+    ring_ = {empty, empty, empty};
+    for (const std::ptrdiff_t row : {-1, 0}) differencesOfRow(band_, row, shift_, width_, raw_, ringRow(row));
+  }
+
+  /// Rows from 0 on, without a gap.
+  void ofRow(std::ptrdiff_t row, std::vector<float>& weights) {
+    differencesOfRow(band_, row + 1, shift_, width_, raw_, ringRow(row + 1));
+    const std::uint32_t* chart = band_.charts.data() + band_.at(row, 0);
+    for (std::size_t x = 0; x < width_; ++x) {
+      const float distance = ring_[0].distance[x] + ring_[1].distance[x] + ring_[2].distance[x];
+      const float comparable = ring_[0].comparable[x] + ring_[1].comparable[x] + ring_[2].comparable[x];
       // In this order of arguments what is not a number stays so, and is not greater than zero.
       const float agreement = 1.0f - std::max(distance / std::max(comparable, 1.0f), 0.0f) / kLargestDistance;
-      const bool shares = chart[x] != 0 && chart[x] == chart[static_cast<std::ptrdiff_t>(x) + shift];
+      const bool shares = chart[x] != 0 && chart[x] == chart[static_cast<std::ptrdiff_t>(x) + shift_];
       weights[x] = shares && agreement > 0.0f ? agreement * agreement : 0.0f;
     }
+  }
+
+ private:
+  Differences& ringRow(std::ptrdiff_t row) { return ring_[static_cast<std::size_t>(row + 3) % 3]; }
+
+  const Band& band_;
+  std::ptrdiff_t shift_;
+  std::size_t width_;
+  Differences raw_;
+  std::array<Differences, 3> ring_;
+};
+
+/// Adds to every texel of the band the two that lie (dx, dy) and (-dx, -dy) from it, as far as the patches of both
+/// agree with its own. Alone, a texel on one side would bend a slope of light, at the borders of charts most of all; in
+/// pairs slopes cancel.
+void addPair(const Band& band, std::ptrdiff_t dx, std::ptrdiff_t dy, std::size_t width, Sums& sums) {
+  const std::ptrdiff_t shift = dy * static_cast<std::ptrdiff_t>(band.stride) + dx;
+  Agreement ahead(band, shift, width);
+  Agreement behind(band, -shift, width);
+  std::vector<float> weights(width);
+  std::vector<float> others(width);
+  for (std::ptrdiff_t row = 0; row < static_cast<std::ptrdiff_t>(band.rows); ++row) {
+    ahead.ofRow(row, weights);
+    behind.ofRow(row, others);
+    const auto here = static_cast<std::ptrdiff_t>(band.at(row, 0));
     const std::size_t to = static_cast<std::size_t>(row) * width;
-    for (std::size_t x = 0; x < width; ++x) sums.weight[to + x] += weights[x];
+    for (std::size_t x = 0; x < width; ++x) {
+      weights[x] = std::min(weights[x], others[x]);
+      sums.weight[to + x] += 2.0f * weights[x];
+    }
     for (std::size_t c = 0; c < kColors; ++c) {
-      const float* from = band.colors[c].data() + static_cast<std::ptrdiff_t>(here) + shift;
+      const float* from = band.colors[c].data() + here;
       float* sum = sums.colors[c].data() + to;
-      for (std::size_t x = 0; x < width; ++x) sum[x] += weights[x] > 0.0f ? weights[x] * from[x] : 0.0f;
+      for (std::size_t k = 0; k < width; ++k) {
+        const auto x = static_cast<std::ptrdiff_t>(k);
+        sum[k] += weights[k] > 0.0f ? weights[k] * (from[x + shift] + from[x - shift]) : 0.0f;
+      }
     }
   }
 }
@@ -149,8 +180,16 @@ Sums averageBand(const Band& band, std::size_t width) {
   const std::size_t count = width * band.rows;
   sums.weight.assign(count, 0.0f);
   for (std::size_t c = 0; c < kColors; ++c) sums.colors[c].assign(count, 0.0f);
-  for (int dy = -kDenoiseRadius; dy <= kDenoiseRadius; ++dy)
-    for (int dx = -kDenoiseRadius; dx <= kDenoiseRadius; ++dx) addShifted(band, dx, dy, width, sums);
+  for (std::size_t row = 0; row < band.rows; ++row) {
+    const std::size_t here = band.at(static_cast<std::ptrdiff_t>(row), 0);
+    for (std::size_t x = 0; x < width; ++x) {
+      if (band.charts[here + x] == 0) continue;
+      sums.weight[row * width + x] = 1.0f;
+      for (std::size_t c = 0; c < kColors; ++c) sums.colors[c][row * width + x] = band.colors[c][here + x];
+    }
+  }
+  for (int dy = 0; dy <= kDenoiseRadius; ++dy)
+    for (int dx = dy == 0 ? 1 : -kDenoiseRadius; dx <= kDenoiseRadius; ++dx) addPair(band, dx, dy, width, sums);
   return sums;
 }
 
@@ -162,7 +201,8 @@ void denoise(Image& flat, std::array<Image, 3>& rnm, std::span<const std::uint32
   const auto height = static_cast<std::size_t>(flat.height);
   LUMEL_CHECK(chartIds.size() == width * height && standardError.size() == width * height);
   const std::array<Image*, kMaps> maps = {&flat, &rnm[0], &rnm[1], &rnm[2]};
-  for (const Image* map : maps) LUMEL_CHECK(map->width == flat.width && map->height == flat.height && map->channels == 3);
+  for (const Image* map : maps)
+    LUMEL_CHECK(map->width == flat.width && map->height == flat.height && map->channels == 3);
   // Bands read rows that their neighbours change.
   const std::array<Image, kMaps> before = {flat, rnm[0], rnm[1], rnm[2]};
   const MapPointers from = {&before[0], &before[1], &before[2], &before[3]};

@@ -1,6 +1,6 @@
-// Takes sampling noise out of a finished page: every texel becomes a weighted mean of the texels of its chart around
-// it that agree with it within their noise (non-local means with known variance: Buades et al. 2005; Rousselle et al.
-// 2012, "Adaptive Rendering with Non-Local Means Filtering", eq. 4).
+// Takes sampling noise out of a finished page: every texel becomes a weighted mean of itself and of pairs of opposite
+// texels of its chart around it that agree with it within their noise (non-local means with known variance: Buades et
+// al. 2005; Rousselle et al. 2012, "Adaptive Rendering with Non-Local Means Filtering", eq. 4).
 #pragma once
 
 #include <array>
