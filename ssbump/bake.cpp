@@ -107,7 +107,8 @@ std::map<std::string, std::string> describe(const BakeSettings& s, const HeightF
   m["lumel:lobe"] = s.maps.lobe == LobeShape::Hemisphere
                         ? "hemisphere"
                         : "cone of " + std::to_string(s.maps.coneOpeningDegrees) + " degrees";
-  m["lumel:occlusion"] = s.backEnd == BackEnd::Horizon ? "horizons, " + std::to_string(s.horizon.azimuths) + " azimuths"
+  const int azimuths = s.horizon.azimuths > 0 ? s.horizon.azimuths : automaticAzimuths(field);
+  m["lumel:occlusion"] = s.backEnd == BackEnd::Horizon ? "horizons, " + std::to_string(azimuths) + " azimuths"
                                                        : "rays, " + std::to_string(s.rays.count) + " per texel";
   m["lumel:reach"] = std::to_string(reach) + " texels";
   return m;

@@ -153,8 +153,14 @@ int automaticReach(const HeightField& field) {
   return static_cast<int>(std::ceil(std::clamp(span / 0.01, 1.0, std::max(1.0, most))));
 }
 
+int automaticAzimuths(const HeightField& field) {
+  constexpr float kLowRelief = 32.0f;
+  return field.highest - field.lowest <= kLowRelief ? 52 : 64;
+}
+
 Horizon::Horizon(const HeightField& field, const HorizonSettings& settings) : settings_(settings), rows_(field) {
-  LUMEL_CHECK(settings.azimuths >= 1);
+  LUMEL_CHECK(settings.azimuths >= 0);
+  if (settings_.azimuths == 0) settings_.azimuths = automaticAzimuths(field);
   if (settings_.reach <= 0) settings_.reach = automaticReach(field);
 }
 

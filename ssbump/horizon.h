@@ -13,14 +13,18 @@
 namespace lumel::ssbump {
 
 struct HorizonSettings {
-  int azimuths = 64;  // >= 1; multiples of 4 are best: no slice then runs along an axis or a diagonal of the map
-  int reach = 0;      // texels beyond which nothing occludes; 0 = automaticReach
+  int azimuths = 0;  // 0 = automaticAzimuths; multiples of 4 are best: no slice then runs along an axis or a diagonal
+  int reach = 0;     // texels beyond which nothing occludes; 0 = automaticReach
   SimdLevel simd = bestSimdLevel();
 };
 
 /// The distance at which the field's whole height span is less than a slope of 0.01, at most four times the larger side
 /// of a tiling map (its highest points have come by before) and no more than the diagonal of one that does not tile.
 int automaticReach(const HeightField& field);
+
+/// Enough that the error from azimuths stays below a tenth of that of 300 random rays on bricks and steps: the horizon
+/// jumps between two azimuths by as much as the heights do.
+int automaticAzimuths(const HeightField& field);
 
 /// Prepared once per field; the field must outlive it.
 class Horizon {

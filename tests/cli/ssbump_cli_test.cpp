@@ -97,7 +97,7 @@ TEST_F(SsbumpCli, ConvertsThereAndBack) {
 
 TEST_F(SsbumpCli, TheCommandLineIsChecked) {
   for (const char* wrong :
-       {"", "h.png", "h.png -o s.png --method guess", "h.png -o s.png --rays 0", "h.png -o s.png --azimuths 0",
+       {"", "h.png", "h.png -o s.png --method guess", "h.png -o s.png --rays 0", "h.png -o s.png --azimuths -1",
         "h.png -o s.png --height-scale tall", "h.png -o s.png --convention cubed", "h.png -o s.jpeg2 ",
         "h.png -o s.png --bits half", "h.png -o s.png --cone-angle 400", "h.png -o s.png --unknown",
         "h.png -o s.png --low x.obj"}) {

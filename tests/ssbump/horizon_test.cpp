@@ -244,5 +244,13 @@ TEST(Horizon, ReachLimitsWhatOccludes) {
   EXPECT_LT(at(wall, 40, 64, {.azimuths = 32, .reach = 80})[0], 0.8f);
 }
 
+TEST(Horizon, HigherReliefTakesMoreAzimuths) {
+  HeightField field;
+  field.highest = 32;
+  EXPECT_EQ(automaticAzimuths(field), 52);
+  field.lowest = -1;
+  EXPECT_EQ(automaticAzimuths(field), 64);
+}
+
 }  // namespace
 }  // namespace lumel::ssbump
