@@ -25,7 +25,8 @@ namespace lumel {
 enum class TraceMode {
   Single,    // one call per ray: the plain way, kept as the yardstick
   Packet,    // 16 rays per call
-  Coherent,  // the same, for closest hits of rays that run close together; no component nearer to zero than 1e-12
+  Coherent,  // the same, for closest hits of rays that run close together; no component nearer to zero than 1e-12,
+             // and no instances that Embree places: in their space a direction may have any. Benchmarks use it alone
 };
 
 /// Up to 16 rays that look for their closest hit. Lanes that are not set are not traced.
@@ -99,7 +100,8 @@ inline Vec3 rayOffset(const Vec3& ng, const Vec3& inwards, float distance) {
 /// the normal, so that rounding cannot put it behind the surface, and as far towards the triangle's centroid, so that
 /// it cannot lie beyond a wall that stands on the triangle's edge.
 inline Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const std::array<Vec3, 3>& corners, float translation) {
-  return p + rayOffset(ng, (corners[0] - p) + (corners[1] - p) + (corners[2] - p), offsetDistance(corners, translation));
+  return p +
+         rayOffset(ng, (corners[0] - p) + (corners[1] - p) + (corners[2] - p), offsetDistance(corners, translation));
 }
 
 class RayScene {
@@ -140,11 +142,6 @@ class RayScene {
   Vec3 boundsMin() const { return boundsMin_; }
   Vec3 boundsMax() const { return boundsMax_; }
   bool empty() const { return parts_.empty(); }
-  /// Whether TraceMode::Coherent may be used: in the space of an instance that Embree places, a direction may have
-  /// any components.
-  bool allowsCoherent() const {
-    return std::none_of(meshScenes_.begin(), meshScenes_.end(), [](const EmbreeScene& s) { return s != nullptr; });
-  }
   /// For benchmarks that call Embree themselves.
   RTCScene embreeScene() const { return top_.get(); }
   std::size_t alphaTestedParts() const { return alphaTested_.size(); }

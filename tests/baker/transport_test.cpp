@@ -288,7 +288,8 @@ TEST(Transport, Interrupted) {
   };
   const TestScene test = busyRoom();
   Stop stop;
-  const auto result = lumel::bake(test.scene, test.atlas, findTexels(test.atlas), {.samples = 4}, stop);
+  const auto result =
+      lumel::bake(test.scene, test.atlas, findTexels(test.atlas), {.integrator = Integrator::Path, .samples = 4}, stop);
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().kind, ErrorKind::Interrupted);
 }
