@@ -209,6 +209,13 @@ Expected<PendingFile> ImageWriter::finish() {
   LUMEL_CHECK(s.nextRow == s.height && !s.complete);
   s.complete = true;
   if (!s.output->close()) return s.failed(s.output->geterror());
+  // Some writers (PNG) do not tell when the disk is full: what cannot be read to its end was not written.
+  auto written = OIIO::ImageInput::open(s.pending.temporary().string());
+  std::vector<float> last(static_cast<std::size_t>(s.spec.width) * static_cast<std::size_t>(s.spec.nchannels));
+  if (!written || !written->read_scanline(s.height - 1, 0, OIIO::TypeDesc::FLOAT, last.data())) {
+    OIIO::geterror();  // about reading, of no use here
+    return s.failed("it is not whole; is the disk full?");
+  }
   return std::move(s.pending);
 }
 
