@@ -60,7 +60,7 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
                  "depends on the machine");
   options.integerOrWord("bounces", a.bake.bounces, {0, 1024}, "all", kAllBounces,
                         "Indirect bounces; 0: direct light only, all: as many as matter");
-  declareSkyOptions(options, a);
+  declareSkyAndSides(options, a);
   options.choice("projection", a.bake.projection, {"raw", "flat", "fit"},
                  "How light is spread over the three maps: as in the literature (raw), scaled so that a flat normal is "
                  "exact (flat), least squares (fit)");
@@ -190,7 +190,7 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   StageClock clock(context.quiet);
   Progress& progress = context.progress;
   clock.start("load");
-  const auto scene = loadLitScene(a);
+  const auto scene = loadLitScene(a, context.progress);
   if (!scene) return scene.error();
   if (!context.quiet) printSettings(record.settings);
   if (!context.quiet) printWarnings(scene->report.warnings);

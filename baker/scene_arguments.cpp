@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "baker/lit_sides.h"
 #include "scene/environment.h"
 #include "scene/load_scene.h"
 
@@ -31,7 +32,7 @@ void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas) {
                   "Let no block of so many texels hold two charts, 4 for block compression; 0: off");
 }
 
-void declareSkyOptions(OptionTable& options, SceneArguments& a) {
+void declareSkyAndSides(OptionTable& options, SceneArguments& a) {
   options.color("sky-color", a.skyColor, {0.0f}, "Radiance of an even sky in nits, red green blue [none]");
   options.path("sky", a.sky, "Sky image: equirectangular .hdr or .exr [none]");
   options
@@ -39,6 +40,9 @@ void declareSkyOptions(OptionTable& options, SceneArguments& a) {
               "Degrees by which the sky image is turned, counter-clockwise from above")
       .placeholder = "DEGREES";
   options.number("sky-strength", a.skyStrength, {0.0f}, "Factor on the sky image or colour");
+  options.choice("double-sided", a.doubleSided, {"lit", "wound"},
+                 "Side of double-sided surfaces that gets the lightmap: their front as it is wound, but the back where "
+                 "only that is lit (lit); always their front (wound)");
 }
 
 Expected<void> checkSky(const SceneArguments& a) {
@@ -53,7 +57,7 @@ Expected<void> checkAtlas(const AtlasOptions& atlas) {
   return {};
 }
 
-Expected<Scene> loadLitScene(const SceneArguments& a) {
+Expected<Scene> loadLitScene(const SceneArguments& a, const Progress& progress) {
   auto scene = loadScene(a.scene, {.allowOutsidePaths = a.allowOutsidePaths});
   if (!scene) return scene;
   if (!a.sky.empty()) {
@@ -65,6 +69,13 @@ Expected<Scene> loadLitScene(const SceneArguments& a) {
   }
   scene->environment.rotationDegrees = a.skyRotation;
   scene->environment.strength = a.skyStrength;
+  if (a.doubleSided == DoubleSided::Wound || !hasLight(*scene)) return scene;
+  const auto turned = turnToLight(*scene, progress);
+  if (!turned) return turned.error();
+  if (*turned > 0)
+    scene->report.warnings.push_back(std::to_string(*turned) +
+                                     " double-sided triangles face the dark: their backs get the lightmap "
+                                     "(--double-sided wound: their fronts)");
   return scene;
 }
 

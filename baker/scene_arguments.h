@@ -8,13 +8,21 @@
 #include "baker/options.h"
 #include "lightmap/atlas.h"
 #include "scene/expected.h"
+#include "scene/progress.h"
 #include "scene/scene.h"
 
 namespace lumel {
 
+/// The side of a double-sided surface that gets the lightmap.
+enum class DoubleSided {
+  Lit,    // the one that is wound to be its front, or the other where only that is lit (turnToLight)
+  Wound,  // the one that is wound to be its front
+};
+
 struct SceneArguments {
   std::filesystem::path scene;
   bool allowOutsidePaths = false;
+  DoubleSided doubleSided = DoubleSided::Lit;
   Vec3 skyColor{0, 0, 0};
   std::filesystem::path sky;
   float skyRotation = 0.0f;
@@ -24,14 +32,14 @@ struct SceneArguments {
 void declareScene(OptionTable& options, SceneArguments& a);
 void declareOutsidePaths(OptionTable& options, SceneArguments& a);
 void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas);
-void declareSkyOptions(OptionTable& options, SceneArguments& a);
+void declareSkyAndSides(OptionTable& options, SceneArguments& a);
 
 /// What the options cannot check one by one. Errors: Usage.
 Expected<void> checkSky(const SceneArguments& a);
 Expected<void> checkAtlas(const AtlasOptions& atlas);
 
-/// The scene with its sky. Errors: Input.
-Expected<Scene> loadLitScene(const SceneArguments& a);
+/// The scene with its sky, double-sided surfaces turned as asked for. Errors: Input, and those of turnToLight.
+Expected<Scene> loadLitScene(const SceneArguments& a, const Progress& progress);
 
 /// Whether anything shines.
 bool hasLight(const Scene& scene);

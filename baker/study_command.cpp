@@ -38,7 +38,7 @@ void declareOptions(OptionTable& options, StudyArguments& a) {
   options.group("Light");
   options.integerOrWord("bounces", a.study.bounces, {0, 1024}, "all", kAllBounces,
                         "Indirect bounces; 0: direct light only, all: as many as matter");
-  declareSkyOptions(options, a);
+  declareSkyAndSides(options, a);
   options.choice("projection", a.study.projection, {"raw", "flat", "fit"},
                  "Of the maps that are compared; the residual is measured for all three");
   options.integer("seed", a.study.seed, "Seed of the candidates; the reference has seeds of its own");
@@ -54,7 +54,7 @@ Expected<void> runStudy(const StudyArguments& a, CommandContext& context) {
   if (auto checked = checkSky(a); !checked) return checked;
   if (auto writable = checkWritable(a.output); !writable) return writable;
   const ThreadLimit limit(a.threads);
-  const auto scene = loadLitScene(a);
+  const auto scene = loadLitScene(a, context.progress);
   if (!scene) return scene.error();
   if (!context.quiet) printWarnings(scene->report.warnings);
   if (!hasLight(*scene)) return inputError(a.scene.string() + ": nothing in it shines; give --sky-color or --sky");
