@@ -117,7 +117,7 @@ std::vector<TwoSided> findTwoSided(const Scene& scene) {
     for (std::size_t p = 0; p < scene.meshes[m].primitives.size(); ++p) {
       const Primitive& primitive = scene.meshes[m].primitives[p];
       const Material& material = scene.materials[static_cast<std::size_t>(primitive.material)];
-      if (!material.doubleSided || material.unlit) continue;
+      if (!material.doubleSided || material.unlit || material.alphaMode != AlphaMode::Opaque) continue;
       TwoSided twoSided{static_cast<int>(m), static_cast<int>(p), patches, 0, {}, {}};
       findPatches(primitive, twoSided);
       patches += twoSided.patchCount;
