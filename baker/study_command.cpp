@@ -75,12 +75,12 @@ Command studyCommand() {
   Command command;
   const auto arguments = std::make_shared<StudyArguments>();
   command.name = "study";
-  command.summary =
-      "Measure what a bake of a scene costs and how wrong it is: error against time and rays, by samples, "
-      "integrators,\n"
-      "projections and texel densities, held against a long path-traced bake";
+  command.summary = "Measure what a bake of a scene costs and how wrong it is";
   command.takesConfig = true;
   command.examples =
+      "Measures error against time and rays by samples, integrators, projections and texel densities, held against a\n"
+      "long path-traced bake.\n"
+      "\n"
       "How to read it: pick the error that you can live with in study.md, and bake with the samples of that row, or "
       "let\n"
       "lumel bake --target-error find them. The reference is two independent halves; how they differ tells its own\n"
