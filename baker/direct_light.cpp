@@ -1,6 +1,102 @@
 #include "baker/direct_light.h"
 
+#include <limits>
+
 namespace lumel {
+namespace {
+
+/// Aims shadow rays at the samples that the receivers see, and weighs what these would bring.
+LUMEL_FOR_EACH_CPU int aimShadows(const ReceiverLanes& receivers, const LightSampleLanes& samples,
+                                  const SurfaceDensity& density, SampledLight& sampled) {
+  const float constant = density.constant, perCosine = density.perCosine;
+  RTCRay16& ray = sampled.shadows.ray;
+  int count = 0;
+#pragma GCC ivdep
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Vec3 wi = samples.wi[lane];
+    const float cosTheta = glm::dot(wi, receivers.ns[lane]);
+    const bool sees = (cosTheta > 0.0f) & (glm::dot(wi, receivers.ng[lane]) > 0.0f);
+    const Vec3 weight = samples.weight[lane];
+    const bool brings = (weight.x != 0.0f) | (weight.y != 0.0f) | (weight.z != 0.0f);
+    const bool taken = (receivers.active[lane] != 0) & sees & brings;
+    const float pdf = samples.pdf[lane];
+    const float byHit = misWeight(pick(pdf > 0.0f, pdf, 1.0f), constant + perCosine * cosTheta);
+    const float share = pick(pdf > 0.0f, byHit, 1.0f);
+    sampled.wi.x[lane] = pick(taken, wi.x, 0.0f);
+    sampled.wi.y[lane] = pick(taken, wi.y, 0.0f);
+    sampled.wi.z[lane] = pick(taken, wi.z, 0.0f);
+    sampled.light.x[lane] = pick(taken, weight.x * share, 0.0f);
+    sampled.light.y[lane] = pick(taken, weight.y * share, 0.0f);
+    sampled.light.z[lane] = pick(taken, weight.z * share, 0.0f);
+    const Vec3 start = receivers.rayStart[lane];
+    const bool distant = samples.distant[lane] != 0;
+    ray.org_x[lane] = start.x;
+    ray.org_y[lane] = start.y;
+    ray.org_z[lane] = start.z;
+    ray.dir_x[lane] = pick(distant, wi.x, samples.target.x[lane] - start.x);
+    ray.dir_y[lane] = pick(distant, wi.y, samples.target.y[lane] - start.y);
+    ray.dir_z[lane] = pick(distant, wi.z, samples.target.z[lane] - start.z);
+    ray.tfar[lane] = pick(distant, std::numeric_limits<float>::infinity(), 1.0f);
+    sampled.shadows.valid[lane] = taken ? -1 : 0;
+    count += taken ? 1 : 0;
+  }
+  return count;
+}
+
+/// For strategies that are sampled lane by lane.
+template <class Take>
+void sampleEach(const ReceiverLanes& receivers, LightSampleLanes& samples, Take take) {
+  for (int lane = 0; lane < kLanes; ++lane) {
+    const auto l = static_cast<std::size_t>(lane);
+    samples.set(l, receivers.active[l] ? take(receivers.p[l], receivers.ns[l], lane) : LightSample{});
+  }
+}
+
+}  // namespace
+
+std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& strategy, const ReceiverLanes& receivers,
+                        const SampleLanes& samples, std::uint32_t patternBase, const SurfaceDensity& density,
+                        SampledLight& sampled) {
+  LightSampleLanes taken;
+  switch (strategy.kind) {
+    case LightStrategy::EveryPunctual: {
+      const UnitLanes choice = samples.draw1D(patternBase + kPunctual);
+      sampleEach(receivers, taken, [&](const Vec3& p, const Vec3& n, int lane) {
+        return transport.punctual.sample(p, n, choice.u[lane]);
+      });
+      break;
+    }
+    case LightStrategy::NearPunctual: {
+      const UnitLanes choice = samples.draw1D(patternBase + kPunctual);
+      sampleEach(receivers, taken, [&](const Vec3& p, const Vec3& n, int lane) {
+        return transport.punctual.sampleNear(p, n, choice.u[lane]);
+      });
+      break;
+    }
+    case LightStrategy::OnePunctual:
+      transport.punctual.sampleOne(strategy.light, receivers.p, taken);
+      break;
+    case LightStrategy::Emissive:
+      transport.emissive.sample(receivers.p, receivers.active, samples.draw1D(patternBase + kEmitter),
+                                samples.draw2D(patternBase + kEmitterPoint), taken);
+      break;
+    case LightStrategy::Sun: {
+      const UnitSquareLanes point = samples.draw2D(patternBase + kSun);
+      sampleEach(receivers, taken,
+                 [&](const Vec3&, const Vec3&, int lane) { return transport.environment.sampleSun(point[lane]); });
+      break;
+    }
+    case LightStrategy::Sky: {
+      const UnitSquareLanes point = samples.draw2D(patternBase + kSky);
+      sampleEach(receivers, taken,
+                 [&](const Vec3&, const Vec3&, int lane) { return transport.environment.sampleSky(point[lane]); });
+      break;
+    }
+  }
+  const int count = aimShadows(receivers, taken, density, sampled);
+  sampled.shadows.any = count > 0;
+  return static_cast<std::uint64_t>(count);
+}
 
 std::vector<LightStrategy> lightStrategies(const LightTransport& transport, bool separate) {
   std::vector<LightStrategy> strategies;

@@ -11,14 +11,15 @@ namespace {
 constexpr float kLeastComponent = 1e-12f;
 
 inline float awayFromZero(float component) {
-  const float least = component < 0.0f ? -kLeastComponent : kLeastComponent;
-  return component < kLeastComponent && component > -kLeastComponent ? least : component;
+  const float least = pick(component < 0.0f, -kLeastComponent, kLeastComponent);
+  return pick((component < kLeastComponent) & (component > -kLeastComponent), least, component);
 }
 
 /// `sampleDirection` has filled rays.dirTangent.
 [[gnu::always_inline]] inline void aim(const PointLanes& from, AimedRays& rays) {
   RTCRay16& ray = rays.packet.rayhit.ray;
   RTCHit16& hit = rays.packet.rayhit.hit;
+#pragma GCC ivdep
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const Vec3 world = from.frame[lane].fromLocal(rays.dirTangent[lane]);
     const bool above = glm::dot(world, from.ng[lane]) > 0.0f;
@@ -87,6 +88,15 @@ LUMEL_FOR_EACH_CPU void clampedDots(const Vec3Lanes& dirTangent, Vec3Lanes& kern
     kernels.x[lane] = above * std::max(0.0f, glm::dot(dir, kRnmBasis[0]));
     kernels.y[lane] = above * std::max(0.0f, glm::dot(dir, kRnmBasis[1]));
     kernels.z[lane] = above * std::max(0.0f, glm::dot(dir, kRnmBasis[2]));
+  }
+}
+
+LUMEL_FOR_EACH_CPU void keepVisible(const ShadowPacket& shadows, float weight, Vec3Lanes& light) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const bool visible = (shadows.valid[lane] != 0) & (shadows.ray.tfar[lane] >= 0.0f);
+    light.x[lane] = pick(visible, light.x[lane] * weight, 0.0f);
+    light.y[lane] = pick(visible, light.y[lane] * weight, 0.0f);
+    light.z[lane] = pick(visible, light.z[lane] * weight, 0.0f);
   }
 }
 

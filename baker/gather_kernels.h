@@ -36,6 +36,9 @@ bool addLight(const Vec3Lanes& dirTangent, const Vec3Lanes& kernels, const Vec3L
 /// RnmKernels::clampedDots for all lanes.
 void clampedDots(const Vec3Lanes& dirTangent, Vec3Lanes& kernels);
 
+/// Light that nothing keeps away, times `weight`; the other lanes' becomes zero.
+void keepVisible(const ShadowPacket& shadows, float weight, Vec3Lanes& light);
+
 /// dirTangent = frame.toLocal(dirWorld).
 void turnToTangent(const FrameLanes& frame, const Vec3Lanes& dirWorld, Vec3Lanes& dirTangent);
 

@@ -127,7 +127,7 @@ class GatherTracer {
       samples.setSample(static_cast<int>(lane), spots[lane].flight.sample);
     }
     shadowRays_ += directLight(
-        transport_, lanes, samples, 0, TraceMode::Packet, [](float cosTheta) { return cosineHemispherePdf(cosTheta); },
+        transport_, lanes, samples, 0, TraceMode::Packet, kCosineDensity,
         [&](int lane, const Vec3& wi, const Vec3& light) {
           const Spot& spot = spots[static_cast<std::size_t>(lane)];
           sink_.light(spot.flight, light * (glm::dot(wi, spot.receiver.ns) * kInvPi), spot.flight.depth + 1);

@@ -141,38 +141,6 @@ struct GatherSink {
   }
 };
 
-namespace {
-
-/// Sampled light of one kind, collected for all lanes before it is added.
-struct LitLanes {
-  const PointLanes& points;
-  std::uint32_t sample;
-  GatherSink& sink;
-  Vec3Lanes wi{}, light{};
-  std::array<bool, kLanes> lit{};
-  bool any = false;
-
-  void add(std::size_t lane, const Vec3& dirWorld, const Vec3& irradianceOverPi) {
-    if (lit[lane]) flush();  // a second kind of light
-    wi.set(lane, dirWorld);
-    light.set(lane, irradianceOverPi);
-    lit[lane] = any = true;
-  }
-  void flush() {
-    if (!any) return;
-    Vec3Lanes dirTangent;
-    turnToTangent(points.frame, wi, dirTangent);
-    sink.addToMaps(dirTangent, light, [this](std::size_t) { return sample; });
-    for (std::size_t lane = 0; lane < kLanes; ++lane)
-      if (lit[lane] && isFinite(light[lane])) sink.addToLevels(lane, dirTangent[lane], light[lane], 0);
-    light = {};
-    lit = {};
-    any = false;
-  }
-};
-
-}  // namespace
-
 std::uint32_t packWeight(const Vec3& weight) {
   std::uint32_t packed = 0;
   for (int i = 0; i < 3; ++i)
@@ -231,16 +199,15 @@ Vec3 GatherWave::meanReflectance(std::size_t lane) const {
 
 void GatherWave::warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts) {
   for (std::uint32_t s = 0; s < kWarmLights; ++s) {
-    const LightLanes& lanes = points_[s].light;
+    const ReceiverLanes receivers = points_[s].receivers();
     lightSamples_.setSampleOfAll(s);
-    counts.shadowRays += directLight(
-        scene_.transport, lanes, lightSamples_, 0, TraceMode::Packet,
-        [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
-        [&](int lane, const Vec3& wi, const Vec3& light) {
-          const auto l = static_cast<std::size_t>(lane);
-          const Vec3 flat = light * (glm::dot(wi, lanes.receivers[l].ns) * kInvPi);
-          if (isFinite(flat)) texels[l].direct += flat / static_cast<float>(kWarmLights);
-        });
+    counts.shadowRays +=
+        directLight(scene_.transport, receivers, lightSamples_, 0, TraceMode::Packet, kGatherDensity,
+                    [&](int lane, const Vec3& wi, const Vec3& light) {
+                      const auto l = static_cast<std::size_t>(lane);
+                      const Vec3 flat = light * (glm::dot(wi, receivers.ns[l]) * kInvPi);
+                      if (isFinite(flat)) texels[l].direct += flat / static_cast<float>(kWarmLights);
+                    });
   }
 }
 
@@ -251,7 +218,7 @@ Flight GatherWave::flightOf(std::size_t lane, std::uint32_t sample, const PointL
           .key = samplers_[lane].seedOf(kHits),
           .dirTangent = rays.dirTangent[lane],
           .beta = Vec3(kInvPi / rays.pdf[lane]),
-          .origin = from.light.receivers[lane].p,
+          .origin = from.p[lane],
           .pdf = rays.pdf[lane]};
 }
 
@@ -267,7 +234,7 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   SampleLanes samples = lightSamples_;
   AimedRays& rays = packets_[0].rays;
   for (std::uint32_t s = 0; s < kWarmRays; ++s) {
-    const PointLanes& from = points_[s];
+    const PointLanes from = points_[s];
     samples.setSampleOfAll(s);
     const UnitSquareLanes u = samples.draw2D(kWarmDirection);
     // By the cosine every ray counts alike, so that no texel passes on more than it receives.
@@ -330,6 +297,15 @@ void GatherWave::gatherLight(const NetRange& net, std::span<LightSpread> spreads
   for (std::size_t k = 0; k < strategies; ++k) sampleStrategy(k, net, samplers, spreads[k], sink);
 }
 
+/// What a strategy's samples brought to the flat map, and would have brought with nothing in the way.
+static void tallyLight(const SampledLight& sampled, const Vec3Lanes& dirTangent, LightTally& tally) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const float flat = luminance(sampled.light[lane]) * kInvPi * dirTangent.z[lane];
+    if (sampled.shadows.valid[lane]) tally.unshadowed += flat * flat;
+    if (sampled.found(lane)) tally.add(lane, flat);
+  }
+}
+
 void GatherWave::sampleStrategy(std::size_t strategy, const NetRange& net,
                                 const std::array<TexelSampler, kLanes>& samplers, LightSpread& spread,
                                 GatherSink& sink) {
@@ -338,28 +314,28 @@ void GatherWave::sampleStrategy(std::size_t strategy, const NetRange& net,
   const float weight = kInvPi * static_cast<float>(net.count()) / static_cast<float>(count);
   const bool pilot = isPilot(net.first);
   LightTally tally;
+  SampledLight sampled;
   for (std::uint32_t s = first; s < first + count; ++s) {
     if ((s - first) % WavePoints::kMost == 0) {
       points_.draw(samplers, kFootprint, s, std::min(WavePoints::kMost, count));
       settle(sink.sums, sink.totals);
     }
-    const PointLanes& points = points_[s];
-    LitLanes lit{points, s, sink};
+    const PointLanes points = points_[s];
     lightSamples_.setSampleOfAll(s);
-    const auto flat = [&](int lane, const Vec3& wi, const Vec3& light) {
-      return luminance(light) * kInvPi * glm::dot(wi, points.light.receivers[static_cast<std::size_t>(lane)].ns);
-    };
-    sink.result.shadowRays += sampleLight(
-        scene_.transport, scene_.strategies[strategy], points.light, lightSamples_, 0, TraceMode::Packet,
-        [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
-        [&](int lane, const Vec3& wi, const Vec3& found) {
-          if (pilot) tally.add(static_cast<std::size_t>(lane), flat(lane, wi, found));
-          lit.add(static_cast<std::size_t>(lane), wi, found * weight);
-        },
-        [&](int lane, const Vec3& wi, const Vec3& tried) {
-          if (pilot) tally.unshadowed += flat(lane, wi, tried) * flat(lane, wi, tried);
-        });
-    lit.flush();
+    const std::uint64_t rays = takeLight(scene_.transport, scene_.strategies[strategy], points.receivers(),
+                                         lightSamples_, 0, kGatherDensity, sampled);
+    if (rays == 0) continue;
+    sink.result.shadowRays += rays;
+    scene_.transport.rays.occluded(sampled.shadows, TraceMode::Packet);
+    Vec3Lanes dirTangent;
+    turnToTangent(points.frame, sampled.wi, dirTangent);
+    if (pilot) tallyLight(sampled, dirTangent, tally);
+    keepVisible(sampled.shadows, weight, sampled.light);
+    sink.addToMaps(dirTangent, sampled.light, [s](std::size_t) { return s; });
+    if (scene_.levels.endless) continue;
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if (sampled.found(lane) && isFinite(sampled.light[lane]))
+        sink.addToLevels(lane, dirTangent[lane], sampled.light[lane], 0);
   }
   if (pilot) tally.enter(spread, count, coveredCount_);
   settle(sink.sums, sink.totals);

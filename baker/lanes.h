@@ -2,6 +2,7 @@
 // vector code for the processor at hand.
 #pragma once
 
+#include <array>
 #include <cstddef>
 
 #include "scene/math.h"
@@ -10,15 +11,30 @@
 // the same bits: products and sums are not fused (the baker's CMakeLists.txt says so) and nothing is reassociated.
 // Sanitizers do not take functions that are chosen at loading.
 #if defined(__x86_64__) && defined(__ELF__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define LUMEL_FOR_EACH_CPU __attribute__((target_clones("avx512f", "avx2", "default")))
+#define LUMEL_FOR_EACH_CPU __attribute__((flatten, target_clones("avx512f", "avx2", "default")))
 #else
 #define LUMEL_FOR_EACH_CPU
 #endif
 
 namespace lumel {
 
+/// `a` where `condition` holds, else `b`. Both are always computed: with ?: and && loops over lanes may keep branches
+/// and then do not become vector code.
+[[gnu::always_inline]] inline float pick(bool condition, float a, float b) { return condition ? a : b; }
+[[gnu::always_inline]] inline Vec3 pick(bool condition, const Vec3& a, const Vec3& b) {
+  return {pick(condition, a.x, b.x), pick(condition, a.y, b.y), pick(condition, a.z, b.z)};
+}
+/// std::clamp by value.
+[[gnu::always_inline]] inline float within(float x, float least, float most) {
+  const float low = x < least ? least : x;
+  return low < most ? low : most;
+}
+
 /// Texels that advance in step: one lane each, one packet per ray call.
 inline constexpr int kLanes = 16;
+
+/// As wide as a float, so that both fit into one loop.
+using LaneFlags = std::array<int, kLanes>;
 
 struct alignas(64) Vec3Lanes {
   float x[kLanes] = {};

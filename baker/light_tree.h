@@ -41,6 +41,10 @@ class LightTree {
   explicit LightTree(std::span<const LightBounds> lights);
 
   bool empty() const { return nodes_.empty(); }
+  /// All lights that can be chosen, in their order, where one leaf holds them; else nothing.
+  std::span<const std::uint32_t> onlyLeaf() const {
+    return nodes_.size() == 1 ? std::span<const std::uint32_t>(order_) : std::span<const std::uint32_t>();
+  }
 
   struct Choice {
     std::uint32_t light = 0;

@@ -2,11 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "baker/light_tree.h"
+#include "baker/lanes.h"
 #include "baker/materials.h"
 #include "baker/ray_scene.h"
+#include "baker/sample_lanes.h"
 #include "scene/scene.h"
 
 namespace lumel {
@@ -19,6 +22,21 @@ struct LightSample {
   float pdf = 0.0f;  // density per solid angle; 0 for punctual lights, which no ray can hit
   bool distant = false;
   Vec3 target{0};  // end of the shadow ray, already off the light's own surface; unless distant
+};
+
+/// One light sample of every lane.
+struct alignas(64) LightSampleLanes {
+  Vec3Lanes wi, weight, target;
+  float pdf[kLanes];
+  int distant[kLanes];
+
+  void set(std::size_t lane, const LightSample& sample) {
+    wi.set(lane, sample.wi);
+    weight.set(lane, sample.weight);
+    target.set(lane, sample.target);
+    pdf[lane] = sample.pdf;
+    distant[lane] = sample.distant ? 1 : 0;
+  }
 };
 
 /// Point, spot and directional lights (KHR_lights_punctual).
@@ -40,8 +58,24 @@ class PunctualLights {
   LightSample sampleNear(const Vec3& p, const Vec3& n, float u) const { return choose(directional_, p, n, u); }
   /// What light `index` brings, without a choice.
   LightSample sampleOne(std::size_t index, const Vec3& p) const;
+  void sampleOne(std::size_t index, const Vec3Lanes& p, LightSampleLanes& samples) const;
 
   static constexpr std::size_t kLocalLights = 32;
+
+  /// A light, ready to be asked. What shines all around has a cone that holds every direction.
+  struct Source {
+    explicit Source(const Light& light);
+    /// facingIrradiance.
+    Vec3 facing(const Vec3& p, Vec3& wi) const;
+
+    bool distant = false;
+    Vec3 power{0};  // colour times candela or lux
+    Vec3 position{0};
+    Vec3 direction{0};
+    float perRange2 = 0.0f;
+    float cosOuter = -2.0f;
+    float perCone = 1.0f;
+  };
 
  private:
   LightSample choose(std::size_t first, const Vec3& p, const Vec3& n, float u) const;
@@ -49,7 +83,7 @@ class PunctualLights {
                           float u) const;
   float importance(std::size_t light, const Vec3& p, const Vec3& n) const;
 
-  std::vector<Light> lights_;
+  std::vector<Source> lights_;
   std::size_t directional_ = 0;
   LightTree tree_;  // over lights_, only with more than kLocalLights that are not directional
 };
@@ -73,6 +107,9 @@ class EmissiveTriangles {
   /// uniform by solid angle where that is not small, else by area. Emission from the front alone unless the material
   /// is doubleSided, times opacity.
   LightSample sample(const Vec3& p, float uTriangle, Vec2 uPoint) const;
+  /// The same for all lanes that are `active`; the others' weight is zero.
+  void sample(const Vec3Lanes& p, const LaneFlags& active, const UnitLanes& uTriangle, const UnitSquareLanes& uPoint,
+              LightSampleLanes& samples) const;
 
   /// The density per solid angle with which sample() from `origin` takes the point that a ray hit. Zero for triangles
   /// that are never chosen.
@@ -94,30 +131,26 @@ class EmissiveTriangles {
     float luminance = 0.0f;     // mean of what it sends out
     std::uint32_t part = 0;
     std::uint32_t triangle = 0;
-    bool doubleSided = false;
+    float back = 0.0f;  // 1: it shines from behind too
     bool uniform = false;  // it sends out `radiance` everywhere
     Vec3 radiance{0};
   };
   /// Fills all from the part and the triangle.
   void describe(Emitter& emitter) const;
   Vec3 radianceAt(const Emitter& emitter, Vec2 barycentric) const;
-  /// The corners as p sees them, and what their solid angle is made of (sampling.h); volume is 0 from the side that
-  /// does not shine.
-  struct View {
-    Vec3 a, b, c;
-    float volume = 0.0f;
-  };
-  static View viewOf(const Emitter& emitter, const Vec3& p);
-  static float solidAngle(const Emitter& emitter, const Vec3& p);
-  /// Mean luminance times solid angle to half a percent, for the choice.
+  /// The emitters that the lanes chose, and with which probability.
+  struct Chosen;
+  static void chooseAmongFew(std::span<const Emitter> few, const Vec3Lanes& p, const UnitLanes& u, Chosen& chosen);
+  static void samplePoints(const Vec3Lanes& p, const UnitSquareLanes& u, Chosen& chosen, LightSampleLanes& samples);
+  /// For the choice.
   float importance(std::uint32_t triangle, const Vec3& p) const;
-  static Vec2 samplePoint(const Emitter& emitter, const Vec3& p, float solidAngle, Vec2 u);
-  static bool bySolidAngle(float solidAngle) { return solidAngle > kLeastSolidAngle && solidAngle < kMostSolidAngle; }
 
   const RayScene* rays_ = nullptr;
   const Materials* materials_ = nullptr;
   std::vector<Emitter> triangles_;
   LightTree tree_;
+  std::vector<Emitter> few_;  // all that can be chosen, where one leaf of the tree holds them
+  bool uniform_ = true;       // all are
 };
 
 /// Radiance that leaves a surface found by a ray towards the ray's origin.

@@ -160,7 +160,7 @@ void WaveTracer::addLight(int lane, const Vec3& dirTangent, const Vec3& radiance
 void WaveTracer::lightTexels() {
   result_.shadowRays += directLight(
       transport_, lanes_, samples_, 0, options_.gatherMode,
-      [](float cosTheta) { return gatherHemispherePdf(cosTheta); },
+      kGatherDensity,
       [&](int lane, const Vec3& wi, const Vec3& light) {
         addLight(lane, paths_[static_cast<std::size_t>(lane)].frame.toLocal(wi), light);
       });
@@ -177,7 +177,7 @@ void WaveTracer::followPaths() {
     const std::uint32_t pattern = static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver;
     result_.shadowRays += directLight(
         transport_, lanes_, samples_, pattern, options_.bounceMode,
-        [](float cosTheta) { return cosineHemispherePdf(cosTheta); },
+        kCosineDensity,
         [&](int lane, const Vec3& wi, const Vec3& light) {
           Path& path = paths_[static_cast<std::size_t>(lane)];
           const float cosTheta = glm::dot(wi, lanes_.receivers[static_cast<std::size_t>(lane)].ns);

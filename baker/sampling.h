@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "baker/lanes.h"
 #include "scene/math.h"
 
 namespace lumel {
@@ -18,9 +19,9 @@ inline Vec2 onUnitCircle(float turn) {
   const float a2 = a * a;
   const float s = a * (1.0f + a2 * (-1.0f / 6 + a2 * (1.0f / 120 + a2 * (-1.0f / 5040 + a2 * (1.0f / 362880)))));
   const float c = 1.0f + a2 * (-0.5f + a2 * (1.0f / 24 + a2 * (-1.0f / 720 + a2 * (1.0f / 40320))));
-  const float x = (quarter & 1) != 0 ? s : c;
-  const float y = (quarter & 1) != 0 ? c : s;
-  return {((quarter + 1) & 2) != 0 ? -x : x, (quarter & 2) != 0 ? -y : y};
+  const float x = pick((quarter & 1) != 0, s, c);
+  const float y = pick((quarter & 1) != 0, c, s);
+  return {pick(((quarter + 1) & 2) != 0, -x, x), pick((quarter & 2) != 0, -y, y)};
 }
 
 inline Vec3 directionFromZ(float z, float turn) {
@@ -66,10 +67,26 @@ inline Vec2 invertTriangle(Vec2 barycentric) {
   return {root * root, root > 0 ? barycentric.y / root : 0.0f};
 }
 
+/// The angle of (x, y) for y >= 0, in [0, pi], to 2e-7: without a call and without branches. 0 for (0, 0).
+[[gnu::always_inline]] inline float angleAbove(float y, float x) {
+  const float steep = std::abs(x);
+  const float most = pick(steep >= y, steep, y);
+  const float ratio = pick(steep >= y, y, steep) / pick(most > 0.0f, most, 1.0f);
+  // From pi/8 on turned back by pi/4, so that the series is short.
+  const bool isFar = ratio > 0.41421356f;
+  const float t = pick(isFar, (ratio - 1.0f) / (ratio + 1.0f), ratio);
+  const float t2 = t * t;
+  const float series = t + t * t2 * (-0.33333288f + t2 * (0.19991394f + t2 * (-0.1402655f + t2 * 0.08529791f)));
+  const float near = pick(isFar, 0.25f * kPi + series, series);
+  const float acute = pick(steep >= y, near, 0.5f * kPi - near);
+  return pick(x < 0.0f, kPi - acute, acute);
+}
+inline double angleAbove(double y, double x) { return std::atan2(y, x); }
+
 /// tan(solidAngle / 2) of a triangle seen from the origin as volume / below, for corners in any order (Van Oosterom and
 /// Strackee 1983). volume = |dot(a, cross(b - a, c - a))|; taken from the edges it is accurate for small triangles.
 template <class V, class T>
-T belowSolidAngle(const V& a, const V& b, const V& c) {
+[[gnu::always_inline]] inline T belowSolidAngle(const V& a, const V& b, const V& c) {
   const T la = glm::length(a);
   const T lb = glm::length(b);
   const T lc = glm::length(c);
@@ -78,58 +95,63 @@ T belowSolidAngle(const V& a, const V& b, const V& c) {
 
 /// 0 where the origin lies in the triangle's plane.
 template <class V, class T>
-T triangleSolidAngle(const V& a, const V& b, const V& c, T volume) {
-  return volume > T(0) ? T(2) * std::atan2(volume, belowSolidAngle<V, T>(a, b, c)) : T(0);
+[[gnu::always_inline]] inline T triangleSolidAngle(const V& a, const V& b, const V& c, T volume) {
+  const T angle = T(2) * angleAbove(volume > T(0) ? volume : T(0), belowSolidAngle<V, T>(a, b, c));
+  return volume > T(0) ? angle : T(0);
 }
 
 /// A triangle on the unit sphere, its corners unit vectors. Density: 1 / solidAngle (Arvo 1995, "Stratified Sampling of
 /// Spherical Triangles"). Precondition: not degenerate.
-struct SphericalTriangle {
-  Vec3d a, b, c;
+template <class T>
+struct SphericalTriangleOf {
+  using V = glm::vec<3, T>;
+  V a, b, c;
 
-  double solidAngle() const { return triangleSolidAngle(a, b, c, std::abs(glm::dot(a, glm::cross(b, c)))); }
+  T volume() const { return std::abs(glm::dot(a, glm::cross(b, c))); }
+  T solidAngle() const { return triangleSolidAngle(a, b, c, volume()); }
 
   /// u.x chooses the part cut off by an arc from b to the opposite edge, u.y the place on that arc.
-  /// `angle`: solidAngle(), which the caller has.
-  Vec3d sample(Vec2 u, double angle) const {
-    const Vec3d ab = glm::cross(a, b);
-    const Vec3d ac = glm::cross(a, c);
-    const double scale = 1.0 / std::sqrt(glm::dot(ab, ab) * glm::dot(ac, ac));
-    const double cosAlpha = glm::dot(ab, ac) * scale;
-    // Not from the cosine, which is blind where the angle is small. (cross(ab, ac) = a * volume.)
-    const double sinAlpha = std::abs(glm::dot(a, glm::cross(b, c))) * scale;
-    const double part = static_cast<double>(u.x) * angle;
-    const double sinPart = std::sin(part);
-    const double cosPart = std::cos(part);
-    const double s = sinPart * cosAlpha - cosPart * sinAlpha;  // of part - alpha
-    const double t = cosPart * cosAlpha + sinPart * sinAlpha;
-    const double across = t - cosAlpha;
-    const double along = s + sinAlpha * glm::dot(a, b);
-    const double below = (along * s + across * t) * sinAlpha;
-    const double q = std::clamp(((along * t - across * s) * cosAlpha - along) / below, -1.0, 1.0);
-    const Vec3d end = below != 0.0 ? arcPoint(a, c, q) : a;
-    const double z = 1.0 - static_cast<double>(u.y) * (1.0 - glm::dot(end, b));
-    return arcPoint(b, end, z);
+  /// `angle`: solidAngle(), `volumeOfCorners`: volume(), which a caller may know better.
+  [[gnu::always_inline]] V sample(Vec2 u, T angle, T volumeOfCorners) const {
+    // The part is (a, b, end) with end on the arc from a to c. By the formula above its solid angle is `part` where
+    // dot(end + a, g) = 0 with g = sin(part/2) (a + b) - cos(part/2) cross(a, b); so half way from a to end lies
+    // c dot(a, g) - a dot(c, g), and end is a mirrored there. Nothing cancels where the triangle is small.
+    const Vec2 turned = onUnitCircle(u.x * static_cast<float>(angle) * (0.25f * kInvPi));
+    const T cosine = turned.x, sine = turned.y;
+    const T alongA = sine * (T(1) + glm::dot(a, b));
+    const T alongC = sine * (glm::dot(a, c) + glm::dot(b, c)) - cosine * volumeOfCorners;
+    const V half = c * alongA - a * alongC;
+    const T half2 = glm::dot(half, half);
+    const T turn = T(2) * glm::dot(a, half) / (half2 > T(0) ? half2 : T(1));
+    const V end = half * turn - a * (half2 > T(0) ? T(1) : T(-1));
+    const V chord = end - b;
+    const T fromOne = static_cast<T>(u.y) * (T(0.5) * glm::dot(chord, chord));  // 1 - the cosine of the place
+    const V side = chord - b * glm::dot(b, chord);
+    const T side2 = glm::dot(side, side);
+    const T reach = std::sqrt(fromOne * (T(2) - fromOne) / (side2 > T(0) ? side2 : T(1)));
+    return b * (T(1) - fromOne) + side * reach;
   }
-  Vec2 invert(const Vec3d& w) const {
-    Vec3d end = glm::cross(glm::cross(b, w), glm::cross(c, a));
-    if (!(glm::dot(end, end) > 0.0)) return {0.0f, 0.0f};  // at b
-    end = glm::normalize(glm::dot(end, a + c) < 0.0 ? -end : end);
-    const double part = SphericalTriangle{a, b, end}.solidAngle() / solidAngle();
-    const Vec3d toW = w - b;
-    const Vec3d toEnd = end - b;
+  Vec2 invert(const V& w) const {
+    V end = glm::cross(glm::cross(b, w), glm::cross(c, a));
+    if (!(glm::dot(end, end) > T(0))) return {0.0f, 0.0f};  // at b
+    end = glm::normalize(glm::dot(end, a + c) < T(0) ? -end : end);
+    const T part = SphericalTriangleOf{a, b, end}.solidAngle() / solidAngle();
+    const V toW = w - b;
+    const V toEnd = end - b;
     return {static_cast<float>(part), static_cast<float>(glm::dot(toW, toW) / glm::dot(toEnd, toEnd))};
   }
-
- private:
-  /// The point at cosine z from `from` on the arc towards `to`.
-  static Vec3d arcPoint(const Vec3d& from, const Vec3d& to, double z) {
-    const Vec3d side = to - from * glm::dot(from, to);
-    const double length = glm::length(side);
-    if (!(length > 0.0)) return from;
-    return from * z + side * (std::sqrt(std::max(0.0, (1.0 - z) * (1.0 + z))) / length);
-  }
 };
+using SphericalTriangle = SphericalTriangleOf<double>;
+
+/// The density with which a surface gathers from a direction above it.
+struct SurfaceDensity {
+  float constant = 0.0f;
+  float perCosine = 0.0f;
+  float operator()(float cosTheta) const { return cosTheta > 0.0f ? constant + perCosine * cosTheta : 0.0f; }
+};
+/// That of sampleGatherHemisphere and sampleCosineHemisphere.
+inline constexpr SurfaceDensity kGatherDensity{0.25f * kInvPi, 0.5f * kInvPi};
+inline constexpr SurfaceDensity kCosineDensity{0.0f, kInvPi};
 
 /// Weight of a sample taken with density `pdf` where another technique would take it with `other` (Veach 1997, the
 /// power heuristic with exponent 2, one sample of each). An `other` of zero gives 1, an infinite one 0.

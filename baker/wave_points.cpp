@@ -2,31 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "scene/check.h"
 
 namespace lumel {
-namespace {
-
-LUMEL_FOR_EACH_CPU void drawSquare(std::uint32_t seed, std::uint32_t first, float* x, float* y) {
-  for (std::uint32_t i = 0; i < WavePoints::kMost; ++i) {
-    const Vec2 u = sobol2D(first + i, seed);
-    x[i] = u.x;
-    y[i] = u.y;
-  }
-}
-
-Frame frameAt(const std::array<Vec3, 3>& normals, const std::array<Vec4, 3>& tangents, const Vec3& ng, Vec2 w) {
-  const float w0 = 1.0f - w.x - w.y;
-  const Vec3 normal = w0 * normals[0] + w.x * normals[1] + w.y * normals[2];
-  const float length2 = glm::dot(normal, normal);
-  const bool isSmooth = length2 > 1e-12f && std::isfinite(length2);
-  // A chart never mixes handedness, so neither does a triangle: the interpolated w keeps its sign.
-  const Vec4 tangent = w0 * tangents[0] + w.x * tangents[1] + w.y * tangents[2];
-  return frameFromTangent(isSmooth ? normal / std::sqrt(length2) : ng, tangent);
-}
-
-}  // namespace
 
 WavePoints::WavePoints(const RayScene& rays, const Atlas& atlas, const PageTexels& page, std::size_t first,
                        std::size_t count) {
@@ -36,14 +16,18 @@ WavePoints::WavePoints(const RayScene& rays, const Atlas& atlas, const PageTexel
       areas_[lane] = footprint.clip(atlas, page, first + lane);
       if (areas_[lane] > 0) addTexel(rays, atlas, footprint, lane);
     }
+    active_[lane] = areas_[lane] > 0;
+    firstSource_[lane + 1] = static_cast<std::uint32_t>(sources_.size());
     firstPiece_[lane + 1] = static_cast<std::uint32_t>(pieces_.size());
-    for (PointLanes& point : points_) point.light.active[lane] = areas_[lane] > 0;
+    turns_[lane] = turns(lane);
+    turning_ = turning_ || turns_[lane];
   }
-}
-
-void WavePoints::leaveOut(std::size_t lane) {
-  leftOut_[lane] = true;
-  for (PointLanes& point : points_) point.light.active[lane] = false;
+  for (std::size_t i = 0; i < (turning_ ? kMost : 1); ++i)
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      if (!active_[lane] || turns_[lane]) continue;
+      surfaces_[i].frame.set(lane, sources_[firstSource_[lane]].frame);
+      surfaces_[i].ng.set(lane, sources_[firstSource_[lane]].ng);
+    }
 }
 
 void WavePoints::addTexel(const RayScene& rays, const Atlas& atlas, const TexelFootprint& footprint,
@@ -64,7 +48,12 @@ void WavePoints::addTexel(const RayScene& rays, const Atlas& atlas, const TexelF
     source.offsetMeters = offsetDistance(corners, rays.translationOf(surface.instance));
     source.flat = source.normals[0] == source.normals[1] && source.normals[0] == source.normals[2] &&
                   source.tangents[0] == source.tangents[1] && source.tangents[0] == source.tangents[2];
-    if (source.flat) source.frame = frameAt(source.normals, source.tangents, source.ng, Vec2(0.0f));
+    if (source.flat) {
+      const Vec3& normal = source.normals[0];
+      const float length2 = glm::dot(normal, normal);
+      const bool isSmooth = length2 > 1e-12f && std::isfinite(length2);
+      source.frame = frameFromTangent(isSmooth ? normal / std::sqrt(length2) : source.ng, source.tangents[0]);
+    }
     sources_.push_back(source);
   }
   for (const TexelFootprint::Piece& from : footprint.pieces()) {
@@ -75,49 +64,144 @@ void WavePoints::addTexel(const RayScene& rays, const Atlas& atlas, const TexelF
   LUMEL_CHECK(pieces_.size() > firstPiece_[lane]);
 }
 
+bool WavePoints::turns(std::size_t lane) const {
+  const auto same = [](const Frame& a, const Frame& b) { return a.t == b.t && a.b == b.b && a.n == b.n; };
+  for (std::uint32_t i = firstSource_[lane]; i < firstSource_[lane + 1]; ++i) {
+    const Source& first = sources_[firstSource_[lane]];
+    if (!sources_[i].flat || !same(sources_[i].frame, first.frame) || sources_[i].ng != first.ng) return true;
+  }
+  return false;
+}
+
+/// As TexelFootprint::sample: u.x chooses the piece, and what is left of it the reach within.
+LUMEL_FOR_EACH_CPU void WavePoints::choose(std::span<const Piece> pieces, float area, std::uint32_t seed,
+                                           std::uint32_t first, Places& places) {
+  alignas(64) float target[kMost];
+  alignas(64) float y[kMost];
+  for (std::uint32_t i = 0; i < kMost; ++i) {
+    const Vec2 u = sobol2D(first + i, seed);
+    target[i] = u.x * area;
+    y[i] = u.y;
+  }
+  alignas(64) std::uint32_t source[kMost];
+  alignas(64) float before[kMost], size[kMost], startX[kMost], startY[kMost];
+  alignas(64) float secondX[kMost], secondY[kMost], thirdX[kMost], thirdY[kMost];
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    const Piece piece = pieces[k];
+    // Pieces before the first one with points need no test.
+    const float from = k == 0 ? -1.0f : piece.areaBefore;
+    for (std::uint32_t i = 0; i < kMost; ++i) {
+      const bool reached = target[i] >= from;
+      source[i] = reached ? piece.source : source[i];
+      before[i] = pick(reached, piece.areaBefore, before[i]);
+      size[i] = pick(reached, piece.area, size[i]);
+      startX[i] = pick(reached, piece.start.x, startX[i]);
+      startY[i] = pick(reached, piece.start.y, startY[i]);
+      secondX[i] = pick(reached, piece.toSecond.x, secondX[i]);
+      secondY[i] = pick(reached, piece.toSecond.y, secondY[i]);
+      thirdX[i] = pick(reached, piece.toThird.x, thirdX[i]);
+      thirdY[i] = pick(reached, piece.toThird.y, thirdY[i]);
+    }
+  }
+  for (std::uint32_t i = 0; i < kMost; ++i) {
+    const float share = within((target[i] - before[i]) / size[i], 0.0f, 1.0f);
+    const float reach = std::sqrt(share);
+    const float x = startX[i] + reach * ((1.0f - y[i]) * secondX[i] + y[i] * thirdX[i]);
+    const float z = startY[i] + reach * ((1.0f - y[i]) * secondY[i] + y[i] * thirdY[i]);
+    places.source[i] = source[i];
+    places.x[i] = within(x, 0.0f, 1.0f);
+    places.y[i] = within(z, 0.0f, 1.0f - places.x[i]);
+  }
+}
+
+/// The points that lie on one source.
+LUMEL_FOR_EACH_CPU void WavePoints::locate(const Source& from, std::uint32_t number, const Places& places,
+                                           Drawn& drawn) {
+  const Vec3 p0 = from.p0, e1 = from.e1, e2 = from.e2, ng = from.ng;
+  const float distance = from.offsetMeters;
+  for (std::uint32_t i = 0; i < kMost; ++i) {
+    const bool here = places.source[i] == number;
+    const Vec3 fromFirst = places.x[i] * e1 + places.y[i] * e2;
+    const Vec3 p = p0 + fromFirst;
+    const Vec3 start = p + rayOffset(ng, e1 + e2 - 3.0f * fromFirst, distance);
+    for (int k = 0; k < 3; ++k) {
+      drawn.p[k][i] = pick(here, p[k], drawn.p[k][i]);
+      drawn.rayStart[k][i] = pick(here, start[k], drawn.rayStart[k][i]);
+    }
+  }
+}
+
+/// As frameFromTangent of the interpolated normal and tangent, without branches.
+LUMEL_FOR_EACH_CPU void WavePoints::locateFrames(const Source& from, std::uint32_t number, const Places& places,
+                                                 Drawn& drawn) {
+  const std::array<Vec3, 3> normals = from.normals;
+  const std::array<Vec4, 3> tangents = from.tangents;
+  const Vec3 ng = from.ng;
+  // A chart never mixes handedness, so neither does a triangle.
+  const float hand = tangents[0].w < 0.0f ? -1.0f : 1.0f;
+  constexpr float kMostFinite = std::numeric_limits<float>::max();
+  for (std::uint32_t i = 0; i < kMost; ++i) {
+    const bool here = places.source[i] == number;
+    const float w1 = places.x[i], w2 = places.y[i];
+    const float w0 = 1.0f - w1 - w2;
+    const Vec3 normal = w0 * normals[0] + w1 * normals[1] + w2 * normals[2];
+    const float length2 = glm::dot(normal, normal);
+    const bool isSmooth = (length2 > 1e-12f) & (length2 <= kMostFinite);
+    const float shrink = 1.0f / std::sqrt(pick(isSmooth, length2, 1.0f));
+    const Vec3 n = pick(isSmooth, normal * shrink, ng);
+    const Vec3 raw = w0 * Vec3(tangents[0]) + w1 * Vec3(tangents[1]) + w2 * Vec3(tangents[2]);
+    const Vec3 side = raw - n * glm::dot(n, raw);
+    const float side2 = glm::dot(side, side);
+    const bool isFrame = (side2 > 1e-12f * glm::dot(raw, raw)) & (side2 <= kMostFinite);
+    const float unit = 1.0f / std::sqrt(pick(isFrame, side2, 1.0f));
+    const Frame any = frameAround(n);
+    const Vec3 t = pick(isFrame, side * unit, any.t);
+    const float turn = pick(isFrame, hand, 1.0f);
+    const Vec3 b = turn * glm::cross(n, t);
+    for (int k = 0; k < 3; ++k) {
+      drawn.t[k][i] = pick(here, t[k], drawn.t[k][i]);
+      drawn.b[k][i] = pick(here, b[k], drawn.b[k][i]);
+      drawn.n[k][i] = pick(here, n[k], drawn.n[k][i]);
+      drawn.ng[k][i] = pick(here, ng[k], drawn.ng[k][i]);
+    }
+  }
+}
+
 void WavePoints::draw(const std::array<TexelSampler, kLanes>& samplers, std::uint32_t pattern, std::uint32_t first,
                       std::uint32_t count) {
   LUMEL_CHECK(count >= 1 && count <= kMost && (count & (count - 1)) == 0);
   mask_ = count - 1;
+  Drawn drawn;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    if (!covered(lane)) continue;
-    alignas(64) float x[kMost];
-    alignas(64) float y[kMost];
-    drawSquare(samplers[lane].seedOf(pattern), first, x, y);
-    for (std::uint32_t i = 0; i < count; ++i) store(lane, i, choose(lane, {x[i], y[i]}));
+    if (!active_[lane]) continue;
+    Places& places = places_[lane];
+    choose(std::span(pieces_).subspan(firstPiece_[lane], firstPiece_[lane + 1] - firstPiece_[lane]),
+           static_cast<float>(areas_[lane]), samplers[lane].seedOf(pattern), first, places);
+    for (std::uint32_t s = firstSource_[lane]; s < firstSource_[lane + 1]; ++s) {
+      locate(sources_[s], s, places, drawn);
+      if (turns_[lane]) locateFrames(sources_[s], s, places, drawn);
+    }
+    const auto hand = [&](const float(&from)[3][kMost], std::uint32_t i, Vec3Lanes& to) {
+      to.x[lane] = from[0][i];
+      to.y[lane] = from[1][i];
+      to.z[lane] = from[2][i];
+    };
+    for (std::uint32_t i = 0; i < count; ++i) {
+      hand(drawn.p, i, p_[i]);
+      hand(drawn.rayStart, i, rayStarts_[i]);
+      if (!turns_[lane]) continue;
+      hand(drawn.t, i, surfaces_[i].frame.t);
+      hand(drawn.b, i, surfaces_[i].frame.b);
+      hand(drawn.n, i, surfaces_[i].frame.n);
+      hand(drawn.ng, i, surfaces_[i].ng);
+    }
   }
 }
 
-/// As TexelFootprint::sample: u.x chooses the piece, and what is left of it the reach within.
-WavePoints::Place WavePoints::choose(std::size_t lane, Vec2 u) const {
-  const Piece* piece = pieces_.data() + firstPiece_[lane];
-  const Piece* const last = pieces_.data() + firstPiece_[lane + 1] - 1;
-  const float target = u.x * static_cast<float>(areas_[lane]);
-  while (piece != last && target >= piece[1].areaBefore) ++piece;
-  const float share = std::clamp((target - piece->areaBefore) / piece->area, 0.0f, 1.0f);
-  const Vec2 w = piece->start + std::sqrt(share) * ((1.0f - u.y) * piece->toSecond + u.y * piece->toThird);
-  const float w1 = std::clamp(w.x, 0.0f, 1.0f);
-  return {piece->source, {w1, std::clamp(w.y, 0.0f, 1.0f - w1)}};
-}
-
-void WavePoints::store(std::size_t lane, std::uint32_t i, const Place& place) {
-  const Source& source = sources_[place.source];
-  const Vec2 w = place.weights;
-  const Vec3 fromFirst = w.x * source.e1 + w.y * source.e2;
-  const Vec3 p = source.p0 + fromFirst;
-  const Vec3 start = p + rayOffset(source.ng, source.e1 + source.e2 - 3.0f * fromFirst, source.offsetMeters);
-  const Frame frame = source.flat ? source.frame : frameAt(source.normals, source.tangents, source.ng, w);
-  places_[i][lane] = place;
-  PointLanes& point = points_[i];
-  point.rayStart.set(lane, start);
-  point.frame.set(lane, frame);
-  point.ng.set(lane, source.ng);
-  point.light.receivers[lane] = {p, source.ng, frame.n, start};
-}
-
 PlaceOnTriangle WavePoints::place(std::size_t lane, std::uint32_t i) const {
-  const Place& place = places_[i & mask_][lane];
-  return {sources_[place.source].triangle, place.weights};
+  const Places& places = places_[lane];
+  const std::uint32_t at = i & mask_;
+  return {sources_[places.source[at]].triangle, {places.x[at], places.y[at]}};
 }
 
 }  // namespace lumel

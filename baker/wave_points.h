@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "baker/direct_light.h"
@@ -13,12 +14,17 @@
 
 namespace lumel {
 
-/// One point of every texel of a wave. Lanes without a texel, or whose texel has no area, hold zeros.
+/// One point of every texel of a wave: a view into WavePoints, until it draws again. Lanes that are not active, without
+/// a texel or whose texel has no area, hold arbitrary points.
 struct PointLanes {
-  Vec3Lanes rayStart;
-  FrameLanes frame;
-  Vec3Lanes ng;      // geometric normal
-  LightLanes light;  // the same points as receivers of sampled light
+  const LaneFlags& active;
+  const Vec3Lanes& p;
+  const Vec3Lanes& rayStart;
+  const FrameLanes& frame;
+  const Vec3Lanes& ng;  // geometric normal
+
+  /// The same points as receivers of sampled light.
+  ReceiverLanes receivers() const { return {active, p, ng, frame.n, rayStart}; }
 };
 
 /// Where on its triangle a point lies.
@@ -36,16 +42,20 @@ class WavePoints {
 
   /// Covered area in texels; 0: nothing to sample.
   double area(std::size_t lane) const { return areas_[lane]; }
-  bool covered(std::size_t lane) const { return areas_[lane] > 0 && !leftOut_[lane]; }
-  /// From now on the lane is without a texel. Precondition: nothing was drawn.
-  void leaveOut(std::size_t lane);
+  bool covered(std::size_t lane) const { return active_[lane] != 0; }
+  /// From now on the lane is without a texel.
+  void leaveOut(std::size_t lane) { active_[lane] = 0; }
 
   /// Draws samples [first, first + count) of a pattern, count <= kMost a power of two: point i of every texel is its
   /// sample first + i, uniform over the texel's covered area.
   void draw(const std::array<TexelSampler, kLanes>& samplers, std::uint32_t pattern, std::uint32_t first,
             std::uint32_t count);
   /// Points are used over and over: i counts modulo the number drawn.
-  const PointLanes& operator[](std::uint32_t i) const { return points_[i & mask_]; }
+  PointLanes operator[](std::uint32_t i) const {
+    const std::uint32_t at = i & mask_;
+    const SurfaceLanes& surface = surfaces_[turning_ ? at : 0];
+    return {active_, p_[at], rayStarts_[at], surface.frame, surface.ng};
+  }
   PlaceOnTriangle place(std::size_t lane, std::uint32_t i) const;
 
  private:
@@ -67,22 +77,44 @@ class WavePoints {
     float area = 0.0f;
     Vec2 start{0}, toSecond{0}, toThird{0};
   };
-  struct Place {
-    std::uint32_t source = 0;
-    Vec2 weights{0};
+  /// The points of one texel: source, and the weights of its vertices 1 and 2.
+  struct alignas(64) Places {
+    std::uint32_t source[kMost];
+    float x[kMost];
+    float y[kMost];
+  };
+  /// The same points in space.
+  struct alignas(64) Drawn {
+    float p[3][kMost];
+    float rayStart[3][kMost];
+    float t[3][kMost];
+    float b[3][kMost];
+    float n[3][kMost];
+    float ng[3][kMost];
+  };
+  struct SurfaceLanes {
+    FrameLanes frame;
+    Vec3Lanes ng;
   };
   void addTexel(const RayScene& rays, const Atlas& atlas, const TexelFootprint& footprint, std::size_t lane);
-  Place choose(std::size_t lane, Vec2 u) const;
-  void store(std::size_t lane, std::uint32_t i, const Place& place);
+  bool turns(std::size_t lane) const;
+  static void choose(std::span<const Piece> pieces, float area, std::uint32_t seed, std::uint32_t first, Places& places);
+  static void locate(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
+  static void locateFrames(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
 
   std::array<double, kLanes> areas_{};
-  std::array<bool, kLanes> leftOut_{};
-  std::vector<Source> sources_;
+  LaneFlags active_{};
+  std::vector<Source> sources_;                          // lane by lane
   std::vector<Piece> pieces_;                            // lane by lane
-  std::array<std::uint32_t, kLanes + 1> firstPiece_{};  // of each lane
+  std::array<std::uint32_t, kLanes + 1> firstSource_{};  // of each lane
+  std::array<std::uint32_t, kLanes + 1> firstPiece_{};
+  std::array<bool, kLanes> turns_{};  // the frame is not the same all over the texel
+  bool turning_ = false;              // any does
   std::uint32_t mask_ = 0;
-  std::array<PointLanes, kMost> points_;
-  std::array<std::array<Place, kLanes>, kMost> places_;
+  std::array<Vec3Lanes, kMost> p_;
+  std::array<Vec3Lanes, kMost> rayStarts_;
+  std::array<SurfaceLanes, kMost> surfaces_;  // the first alone where no texel turns
+  std::array<Places, kLanes> places_;
 };
 
 }  // namespace lumel

@@ -182,13 +182,41 @@ TEST(SphericalTriangle, RoundTrips) {
   for (const SphericalTriangle& triangle : sphericalTriangles())
     for (std::uint32_t i = 0; i < 512; ++i) {
       const Vec2 u = sobol2D(i, 3);
-      const Vec3d w = triangle.sample(u, triangle.solidAngle());
+      const Vec3d w = triangle.sample(u, triangle.solidAngle(), triangle.volume());
       EXPECT_NEAR(glm::length(w), 1.0, 1e-9);
       const Vec2 back = triangle.invert(w);
       // Near the corner b all u.x meet.
       EXPECT_NEAR(back.x, u.x, 1e-4f / std::max(0.01f, std::sqrt(u.y)));
       EXPECT_NEAR(back.y, u.y, 1e-4f);
     }
+}
+
+// What light sampling uses: in float the samples of triangles of 0.03 steradians and more are those in double.
+TEST(SphericalTriangle, FloatAsDouble) {
+  const std::vector<SphericalTriangle> triangles = sphericalTriangles();
+  const SphericalTriangle least{glm::normalize(Vec3d(0.9, 0.1, 3)), glm::normalize(Vec3d(1.5, 0.1, 3)),
+                                glm::normalize(Vec3d(1, 1.2, 3))};
+  EXPECT_NEAR(least.solidAngle(), 0.03, 0.004);
+  for (const SphericalTriangle& triangle : {triangles[0], triangles[1], least}) {
+    const SphericalTriangleOf<float> same{Vec3(triangle.a), Vec3(triangle.b), Vec3(triangle.c)};
+    EXPECT_NEAR(same.solidAngle() / triangle.solidAngle(), 1.0, 1e-5);
+    for (std::uint32_t i = 0; i < 512; ++i) {
+      const Vec2 u = sobol2D(i, 3);
+      const Vec3d exact = triangle.sample(u, triangle.solidAngle(), triangle.volume());
+      const Vec3 w = same.sample(u, static_cast<float>(triangle.solidAngle()), static_cast<float>(triangle.volume()));
+      // A few roundings of 6e-8, divided by the width of the smallest.
+      EXPECT_LT(glm::distance(Vec3d(w), exact), 1e-5);
+    }
+  }
+}
+
+TEST(SphericalTriangle, AngleAbove) {
+  EXPECT_EQ(angleAbove(0.0f, 0.0f), 0.0f);
+  for (int i = 0; i <= 1000; ++i) {
+    const double angle = std::numbers::pi * i / 1000.0;
+    const auto y = static_cast<float>(std::abs(std::sin(angle))), x = static_cast<float>(std::cos(angle));
+    EXPECT_NEAR(static_cast<double>(angleAbove(y, x)), std::atan2(static_cast<double>(y), static_cast<double>(x)), 5e-7);
+  }
 }
 
 // The four triangles between the corners and the edges' midpoints receive samples by their solid angle, on two levels.
@@ -210,7 +238,7 @@ TEST(SphericalTriangle, UniformBySolidAngle) {
     std::vector<int> counts(parts.size());
     int inside = 0;
     for (std::uint32_t i = 0; i < kSamples; ++i) {
-      const Vec3d w = triangle.sample(sobol2D(i, 4), triangle.solidAngle());
+      const Vec3d w = triangle.sample(sobol2D(i, 4), triangle.solidAngle(), triangle.volume());
       for (std::size_t k = 0; k < parts.size(); ++k)
         if (holds(parts[k], w)) {
           ++counts[k];

@@ -189,7 +189,7 @@ void BM_DirectLight(benchmark::State& state) {
     }
     ++wave;
     rays += directLight(
-        transport, lanes, samples, 0, TraceMode::Packet, [](float c) { return gatherHemispherePdf(c); },
+        transport, lanes, samples, 0, TraceMode::Packet, kGatherDensity,
         [](int, const Vec3&, const Vec3& light) { benchmark::DoNotOptimize(light); });
   }
   state.SetItemsProcessed(static_cast<std::int64_t>(rays));
