@@ -122,7 +122,7 @@ Expected<BakeSettings> bakeSettings(const SsbumpArguments& a) {
   return settings;
 }
 
-Expected<void> runConvert(const SsbumpArguments& a) {
+Expected<void> runConvert(const SsbumpArguments& a, const Progress& progress) {
   const auto conventionOf = [](int i) { return static_cast<Convention>(i); };
   ConvertSettings settings;
   if (a.from == FromWord::Normal)
@@ -137,7 +137,7 @@ Expected<void> runConvert(const SsbumpArguments& a) {
   settings.crossFadeAmount = a.crossFadeAmount;
   settings.albedo = a.albedo;
   settings.options = mapOptions(a);
-  return convertMap(a.input, a.output, settings);
+  return convertMap(a.input, a.output, settings, progress);
 }
 
 void tell(const CommandContext& context, const BakeReport& report) {
@@ -186,7 +186,7 @@ Expected<void> runStudy(const SsbumpArguments& a, const BakeSettings& settings, 
   Image map = std::move(baked->occlusion);
   for (int y = 0; y < map.height; ++y)
     for (int x = 0; x < map.width; ++x) map.setRgb(x, y, map.rgb(x, y) * normalWeights(baked->normals.rgb(x, y)));
-  return writeStudy(map, a.input.filename().string(), a.study);
+  return writeStudy(map, a.input.filename().string(), a.study, context.progress);
 }
 
 Expected<void> runSsbump(const SsbumpArguments& a, CommandContext& context) {
@@ -195,7 +195,7 @@ Expected<void> runSsbump(const SsbumpArguments& a, CommandContext& context) {
   const ThreadLimit limit(a.threads);
   if (a.convert || !a.crossFade.empty()) {
     if (a.output.empty()) return usageError("-o FILE is missing: where the converted map goes");
-    return runConvert(a);
+    return runConvert(a, context.progress);
   }
   if (isMesh(a.input)) return runMesh(a, context);
   if (!a.low.empty()) return usageError("--low goes with a mesh (.gltf, .glb, .obj) as input");

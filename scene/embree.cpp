@@ -33,9 +33,14 @@ EmbreeScene newEmbreeScene(RTCDevice device) {
   return scene;
 }
 
-Expected<void> commitScene(RTCDevice device, RTCScene scene, const std::string& what) {
+Expected<void> commitScene(RTCDevice device, RTCScene scene, const std::string& what, const Progress& progress) {
+  rtcSetSceneProgressMonitorFunction(
+      scene, [](void* p, double) { return !static_cast<const Progress*>(p)->cancelled(); },
+      const_cast<Progress*>(&progress));
   rtcCommitScene(scene);
+  rtcSetSceneProgressMonitorFunction(scene, nullptr, nullptr);
   const RTCError error = rtcGetDeviceError(device);
+  if (progress.cancelled()) return interrupted();
   if (error != RTC_ERROR_NONE) return failure(what + ": Embree: " + describe(error));
   return {};
 }

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "scene/expected.h"
+#include "scene/progress.h"
 
 namespace lumel {
 
@@ -25,7 +26,9 @@ Expected<EmbreeDevice> newEmbreeDevice();
 /// An empty scene with the settings that measured best: MEDIUM quality and ROBUST (no leaks at shared edges).
 EmbreeScene newEmbreeScene(RTCDevice device);
 
-/// Commits and reports what Embree says of it (out of memory, bad geometry) as Failed.
-Expected<void> commitScene(RTCDevice device, RTCScene scene, const std::string& what);
+/// Commits and reports what Embree says of it (out of memory, bad geometry) as Failed. Interrupted
+/// once `progress` is cancelled.
+Expected<void> commitScene(RTCDevice device, RTCScene scene, const std::string& what,
+                           const Progress& progress = noProgress());
 
 }  // namespace lumel

@@ -20,6 +20,7 @@ namespace lumel {
 namespace {
 
 constexpr int kMaxDimension = 65536;
+constexpr int kRowsAtOnce = 128;  // of a file being written: a multiple of the rows that EXR compresses together
 
 using Head = std::array<std::uint8_t, 32>;  // a file's first bytes, zero where it is shorter
 
@@ -32,7 +33,8 @@ bool storesPalette(const OIIO::ImageSpec& spec, std::string_view format, const H
   return format == "gif" || spec.get_string_attribute("tiff:ColorSpace") == "palette";
 }
 
-Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& name, const Head& head) {
+Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& name, const Head& head,
+                                 const Progress& progress = noProgress()) {
   const OIIO::ImageSpec& spec = input.spec();
   if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0) return inputError(name + ": the image has no pixels");
   if (spec.width > kMaxDimension || spec.height > kMaxDimension)
@@ -48,9 +50,12 @@ Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& nam
     if (attribute.type().basetype == OIIO::TypeDesc::STRING || attribute.type().basevalues() == 1)
       loaded.metadata[attribute.name().string()] = attribute.get_string();
   loaded.image = Image(spec.width, spec.height, spec.nchannels);
-  const int channels = spec.nchannels;
-  if (!input.read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, loaded.image.pixels.data()))
-    return inputError(name + ": cannot be read: " + input.geterror());
+  const auto stop = [](void* p, float) { return static_cast<const Progress*>(p)->cancelled(); };
+  const bool read = input.read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, loaded.image.pixels.data(),
+                                     OIIO::AutoStride, OIIO::AutoStride, OIIO::AutoStride, stop,
+                                     const_cast<Progress*>(&progress));
+  if (progress.cancelled()) return interrupted();
+  if (!read) return inputError(name + ": cannot be read: " + input.geterror());
   return loaded;
 }
 
@@ -86,7 +91,7 @@ std::array<int, 2> imageSize(std::span<const std::uint8_t> encoded) {
   return {input->spec().width, input->spec().height};
 }
 
-Expected<LoadedImage> readImage(const std::filesystem::path& file) {
+Expected<LoadedImage> readImage(const std::filesystem::path& file, const Progress& progress) {
   std::error_code ec;
   if (!std::filesystem::is_regular_file(file, ec)) return inputError(file.string() + ": no such file");
   OIIO::ImageSpec config;
@@ -95,7 +100,7 @@ Expected<LoadedImage> readImage(const std::filesystem::path& file) {
   if (!input) return inputError(file.string() + ": not an image that can be read: " + OIIO::geterror());
   Head head{};
   std::ifstream(file, std::ios::binary).read(reinterpret_cast<char*>(head.data()), head.size());
-  return readOpened(*input, file.string(), head);
+  return readOpened(*input, file.string(), head, progress);
 }
 
 Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std::string& name) {
@@ -180,7 +185,7 @@ Expected<ImageWriter> ImageWriter::open(const std::filesystem::path& file, int w
   return ImageWriter(std::move(state));
 }
 
-Expected<void> ImageWriter::write(const Image& rows) {
+Expected<void> ImageWriter::write(const Image& rows, const Progress& progress) {
   State& s = *state_;
   LUMEL_CHECK(rows.width == s.width && rows.channels == s.channels && s.nextRow + rows.height <= s.height);
   for (std::size_t i = 0; i < rows.pixels.size(); ++i) {
@@ -194,13 +199,15 @@ Expected<void> ImageWriter::write(const Image& rows) {
     if (s.format == PixelFormat::Half && std::abs(v) > 65504.0f)
       return failure(where() + " is " + std::to_string(v) + ", beyond half's 65504; write float");
   }
-  if (s.nextRow == 0 && !s.output->open(s.pending.temporary().string(), s.spec)) return s.failed(s.output->geterror());
-  const bool whole = s.nextRow == 0 && rows.height == s.height;
-  const bool written = whole ? s.output->write_image(OIIO::TypeDesc::FLOAT, rows.pixels.data())
-                             : s.output->write_scanlines(s.nextRow, s.nextRow + rows.height, 0, OIIO::TypeDesc::FLOAT,
-                                                         rows.pixels.data());
-  if (!written) return s.failed(s.output->geterror());
-  s.nextRow += rows.height;
+  for (int y = 0; y < rows.height; y += kRowsAtOnce) {
+    if (progress.cancelled()) return interrupted();
+    if (s.nextRow == 0 && !s.output->open(s.pending.temporary().string(), s.spec))
+      return s.failed(s.output->geterror());
+    const int count = std::min(kRowsAtOnce, rows.height - y);
+    if (!s.output->write_scanlines(s.nextRow, s.nextRow + count, 0, OIIO::TypeDesc::FLOAT, rows.at(0, y)))
+      return s.failed(s.output->geterror());
+    s.nextRow += count;
+  }
   return {};
 }
 
@@ -225,10 +232,11 @@ Expected<void> ImageWriter::commit() {
   return putInPlace({&*pending, 1});
 }
 
-Expected<void> writeImage(const std::filesystem::path& file, const Image& image, const WriteImageOptions& options) {
+Expected<void> writeImage(const std::filesystem::path& file, const Image& image, const WriteImageOptions& options,
+                          const Progress& progress) {
   auto writer = ImageWriter::open(file, image.width, image.height, image.channels, options);
   if (!writer) return writer.error();
-  if (auto done = writer->write(image); !done) return done;
+  if (auto done = writer->write(image, progress); !done) return done;
   return writer->commit();
 }
 

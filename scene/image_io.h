@@ -13,6 +13,7 @@
 #include "scene/expected.h"
 #include "scene/image.h"
 #include "scene/pending_file.h"
+#include "scene/progress.h"
 
 namespace lumel {
 
@@ -27,8 +28,8 @@ struct LoadedImage {
   bool paletted = false;                        // indexed colours (expanded in `image`)
 };
 
-/// Reads any format that OpenImageIO knows. Errors: Input, naming the file.
-Expected<LoadedImage> readImage(const std::filesystem::path& file);
+/// Reads any format that OpenImageIO knows. Errors: Input, naming the file; Interrupted.
+Expected<LoadedImage> readImage(const std::filesystem::path& file, const Progress& progress = noProgress());
 
 /// The same from encoded bytes in memory (glTF images: PNG, JPEG, WebP, ...). `name` is for messages.
 Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std::string& name);
@@ -46,8 +47,10 @@ struct WriteImageOptions {
 
 /// Writes by the file's extension, to a temporary name beside it that is renamed when complete: a reader never sees
 /// half a file. Values are stored as they are (no colour conversion). Errors: Failed (cannot write), Usage (unknown
-/// extension or a value that the format cannot hold: a finite value beyond 65504 with Half, a NaN anywhere).
-Expected<void> writeImage(const std::filesystem::path& file, const Image& image, const WriteImageOptions& options = {});
+/// extension or a value that the format cannot hold: a finite value beyond 65504 with Half, a NaN anywhere),
+/// Interrupted.
+Expected<void> writeImage(const std::filesystem::path& file, const Image& image, const WriteImageOptions& options = {},
+                          const Progress& progress = noProgress());
 
 /// The same in parts, for images that do not fit in memory: rows from the top down, then commit. Without commit nothing
 /// is left behind.
@@ -60,7 +63,7 @@ class ImageWriter {
   ~ImageWriter();
 
   /// The next rows.height rows, `rows` as wide and deep as the file.
-  Expected<void> write(const Image& rows);
+  Expected<void> write(const Image& rows, const Progress& progress = noProgress());
   /// Completes the file and puts it in place. Every row must have been written.
   Expected<void> commit();
   /// Completes the file under its temporary name, to be put in place with others.

@@ -18,4 +18,10 @@ class Progress {
   virtual bool cancelled() const { return false; }
 };
 
+/// For work that nobody watches or stops.
+inline Progress& noProgress() {
+  static Progress silent;
+  return silent;
+}
+
 }  // namespace lumel

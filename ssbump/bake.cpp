@@ -31,8 +31,8 @@ Image alphaPlane(const LoadedImage& loaded, int heightChannel) {
   return {};
 }
 
-Expected<Image> readNormalMap(const std::filesystem::path& file, int width, int height) {
-  auto loaded = readImage(file);
+Expected<Image> readNormalMap(const std::filesystem::path& file, int width, int height, const Progress& progress) {
+  auto loaded = readImage(file, progress);
   if (!loaded) return loaded.error();
   const Image& image = loaded->image;
   if (image.channels < 3)
@@ -52,8 +52,9 @@ struct Inputs {
   Image alpha, normalMap;
 };
 
-Expected<Inputs> readInputs(const std::filesystem::path& input, const BakeSettings& settings) {
-  auto loaded = readImage(input);
+Expected<Inputs> readInputs(const std::filesystem::path& input, const BakeSettings& settings,
+                            Progress& progress) {
+  auto loaded = readImage(input, progress);
   if (!loaded) return loaded.error();
   Inputs inputs;
   const double bits = loaded->isFloat ? 0 : loaded->bitsPerChannel;
@@ -70,10 +71,13 @@ Expected<Inputs> readInputs(const std::filesystem::path& input, const BakeSettin
           settings.height.scaleIsPercent ? settings.height.scale / 100 * inputs.field.width : settings.height.scale;
       threshold = static_cast<float>(2 * std::abs(scale) / (std::exp2(bits) - 1));
     }
-    bilateralFilter(inputs.field, settings.bilateralRadius, threshold);
+    progress.begin("filter", static_cast<std::uint64_t>(inputs.field.height));
+    bilateralFilter(inputs.field, settings.bilateralRadius, threshold, progress);
+    progress.end();
+    if (progress.cancelled()) return interrupted();
   }
   if (!settings.normalMap.empty()) {
-    auto normals = readNormalMap(settings.normalMap, inputs.field.width, inputs.field.height);
+    auto normals = readNormalMap(settings.normalMap, inputs.field.width, inputs.field.height, progress);
     if (!normals) return normals.error();
     inputs.normalMap = std::move(*normals);
   }
@@ -117,7 +121,7 @@ std::map<std::string, std::string> describe(const BakeSettings& s, const HeightF
 /// Either back end behind one call.
 class Occluder {
  public:
-  static Expected<Occluder> prepare(const HeightField& field, const BakeSettings& settings) {
+  static Expected<Occluder> prepare(const HeightField& field, const BakeSettings& settings, const Progress& progress) {
     Occluder self;
     if (settings.backEnd == BackEnd::Horizon) {
       self.horizon_.emplace(field, settings.horizon);
@@ -127,14 +131,14 @@ class Occluder {
       return usageError(
           "--method rays holds the triangles of the whole map, about 200 bytes per texel, and stops at "
           "4096x4096; use --method horizon, which runs in tiles");
-    auto built = RayOcclusion::build(field, settings.rays);
+    auto built = RayOcclusion::build(field, settings.rays, progress);
     if (!built) return built.error();
     self.rays_.emplace(std::move(*built));
     return self;
   }
 
-  Image occlusion(const TexelRect& rect, std::span<const Lobe> lobes) const {
-    return horizon_ ? horizon_->occlusion(rect, lobes) : rays_->occlusion(rect, lobes);
+  Image occlusion(const TexelRect& rect, std::span<const Lobe> lobes, Progress& progress) const {
+    return horizon_ ? horizon_->occlusion(rect, lobes, progress) : rays_->occlusion(rect, lobes, progress);
   }
 
  private:
@@ -147,10 +151,9 @@ Expected<Image> bandOcclusion(const Occluder& occluder, const BakeSettings& sett
                               std::span<const Lobe> lobes, Progress& progress) {
   Image band(width, rows, static_cast<int>(lobes.size()));
   for (int x = 0; x < width; x += settings.tileWidth) {
-    if (progress.cancelled()) return interrupted();
     const TexelRect rect{x, y, std::min(settings.tileWidth, width - x), rows};
-    Image tile = occluder.occlusion(rect, lobes);
-    progress.advance(static_cast<std::uint64_t>(rect.width) * static_cast<std::uint64_t>(rect.height));
+    Image tile = occluder.occlusion(rect, lobes, progress);
+    if (progress.cancelled()) return interrupted();
     if (rect.width == width) return tile;
     copyInto(band, x, tile);
   }
@@ -161,9 +164,9 @@ Expected<Image> bandOcclusion(const Occluder& occluder, const BakeSettings& sett
 
 Expected<BakedInMemory> bakeInMemory(const std::filesystem::path& input, const BakeSettings& settings,
                                      std::span<const Lobe> lobes, Progress& progress) {
-  auto inputs = readInputs(input, settings);
+  auto inputs = readInputs(input, settings, progress);
   if (!inputs) return inputs.error();
-  auto occluder = Occluder::prepare(inputs->field, settings);
+  auto occluder = Occluder::prepare(inputs->field, settings, progress);
   if (!occluder) return occluder.error();
   const int height = inputs->field.height;
   progress.begin("ssbump", inputs->field.texels.size());
@@ -178,7 +181,7 @@ Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const Bak
                                    Progress& progress) {
   LUMEL_CHECK(settings.tileHeight % 2 == 0 && settings.tileWidth > 0);
   const auto started = Clock::now();
-  auto inputs = readInputs(input, settings);
+  auto inputs = readInputs(input, settings, progress);
   if (!inputs) return inputs.error();
   const HeightField& field = inputs->field;
   BakeReport report;
@@ -189,10 +192,10 @@ Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const Bak
   const int wanted = settings.backEnd == BackEnd::Horizon ? settings.horizon.reach : settings.rays.reach;
   report.reachTexels = wanted > 0 ? wanted : automaticReach(field);
 
-  auto occluder = Occluder::prepare(field, settings);
+  auto occluder = Occluder::prepare(field, settings, progress);
   if (!occluder) return occluder.error();
   auto maps = MapSet::open(settings.maps, field.width, field.height, std::move(inputs->alpha),
-                           describe(settings, field, report.reachTexels));
+                           describe(settings, field, report.reachTexels), progress);
   if (!maps) return maps.error();
   report.prepareSeconds = secondsSince(started);
 
@@ -203,11 +206,11 @@ Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const Bak
     auto occlusion = bandOcclusion(*occluder, settings, field.width, y, rows, maps->lobes(), progress);
     if (!occlusion) return occlusion.error();
     report.occlusionSeconds += secondsSince(before);
-    if (auto done = maps->write(bandNormals(*inputs, settings.normalMapGreen, y, rows), *occlusion); !done)
+    if (auto done = maps->write(bandNormals(*inputs, settings.normalMapGreen, y, rows), *occlusion, progress); !done)
       return done.error();
   }
   progress.end();
-  if (auto done = maps->commit(); !done) return done.error();
+  if (auto done = maps->commit(progress); !done) return done.error();
   report.warnings = maps->warnings();
   if (field.lowest == field.highest)
     report.warnings.push_back(input.string() + ": every height is the same: the result is flat");

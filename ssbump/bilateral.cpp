@@ -21,7 +21,7 @@ void copyRow(const HeightField& field, int y, int radius, std::vector<float>& ou
 
 }  // namespace
 
-void bilateralFilter(HeightField& field, int radius, float thresholdTexels) {
+void bilateralFilter(HeightField& field, int radius, float thresholdTexels, Progress& progress) {
   if (radius <= 0 || !(thresholdTexels > 0)) return;
   const auto width = static_cast<std::size_t>(field.width);
   const float sigma = static_cast<float>(radius) / 2;
@@ -35,6 +35,7 @@ void bilateralFilter(HeightField& field, int radius, float thresholdTexels) {
       std::fill(sum.begin(), sum.end(), 0.0f);
       std::fill(weight.begin(), weight.end(), 0.0f);
       for (int dy = -radius; dy <= radius; ++dy) {
+        if (progress.cancelled()) return;
         copyRow(field, static_cast<int>(y) + dy, radius, neighbours);
         for (int dx = -radius; dx <= radius; ++dx) {
           const float spatial = std::exp(-static_cast<float>(dx * dx + dy * dy) / (2 * sigma * sigma));
@@ -51,8 +52,10 @@ void bilateralFilter(HeightField& field, int radius, float thresholdTexels) {
         }
       }
       for (std::size_t x = 0; x < width; ++x) filtered[y * width + x] = own[x] + sum[x] / weight[x];
+      progress.advance(1);
     }
   });
+  if (progress.cancelled()) return;
   field.texels = std::move(filtered);
   field.updateRange();
 }

@@ -74,13 +74,13 @@ Block fetchBlock(const Image& image, int bx, int by) {
 
 std::size_t blockBytes(BlockFormat format) { return format == BlockFormat::Bc1 || format == BlockFormat::Bc4 ? 8 : 16; }
 
-std::vector<std::uint8_t> compressBlocks(const Image& image, BlockFormat format) {
+std::vector<std::uint8_t> compressBlocks(const Image& image, BlockFormat format, const Progress& progress) {
   const auto across = static_cast<std::size_t>((image.width + 3) / 4),
              down = static_cast<std::size_t>((image.height + 3) / 4);
   const std::size_t bytes = blockBytes(format);
   std::vector<std::uint8_t> blocks(across * down * bytes);
   parallelFor(down, 1, [&](std::size_t first, std::size_t last) {
-    for (std::size_t by = first; by < last; ++by)
+    for (std::size_t by = first; by < last && !progress.cancelled(); ++by)
       for (std::size_t bx = 0; bx < across; ++bx)
         compressBlock(fetchBlock(image, static_cast<int>(bx), static_cast<int>(by)), format,
                       &blocks[(by * across + bx) * bytes]);

@@ -8,6 +8,7 @@
 
 #include "scene/expected.h"
 #include "scene/image.h"
+#include "scene/progress.h"
 
 namespace lumel::ssbump {
 
@@ -22,8 +23,9 @@ enum class BlockFormat {
 std::size_t blockBytes(BlockFormat format);
 
 /// Blocks row by row; partial blocks at the right and lower edge repeat the last texel. Values are clamped to 0..1.
-/// Missing channels read as grey (one channel) or alpha 1.
-std::vector<std::uint8_t> compressBlocks(const Image& image, BlockFormat format);
+/// Missing channels read as grey (one channel) or alpha 1. Once `progress` is cancelled the rest is left out: ask it.
+std::vector<std::uint8_t> compressBlocks(const Image& image, BlockFormat format,
+                                         const Progress& progress = noProgress());
 
 /// The texels that the blocks stand for: RGBA; Bc4 in R, Bc5 in R and G.
 Image decompressBlocks(std::span<const std::uint8_t> blocks, int width, int height, BlockFormat format);

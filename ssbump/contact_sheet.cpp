@@ -10,11 +10,11 @@ namespace {
 
 constexpr int kGap = 6;
 
-Image panel(const Image& source, int side, const std::function<Vec3(int, int)>& color) {
+Image panel(const Image& source, int side, const Progress& progress, const std::function<Vec3(int, int)>& color) {
   Image full(source.width, source.height, 3);
-  for (int y = 0; y < full.height; ++y)
+  for (int y = 0; y < full.height && !progress.cancelled(); ++y)
     for (int x = 0; x < full.width; ++x) full.setRgb(x, y, color(x, y));
-  while (full.width > side) full = halve(full, MipFilter::Box, true);
+  while (full.width > side) full = halve(full, MipFilter::Box, true, progress);
   return full;
 }
 
@@ -54,16 +54,17 @@ Expected<void> writeContactSheet(const std::filesystem::path& input, const BakeS
   const auto s = [&](int x, int y) { return normalWeights(normals.rgb(x, y)) * o.rgb(x, y); };
   const Vec3 right = glm::normalize(Vec3(1, 0, 0.5f)), top = glm::normalize(Vec3(0, 1, 0.5f));
   const std::vector<Image> panels{
-      panel(o, side, [&](int x, int y) { return Vec3((field.row(y)[x] - field.lowest) / span); }),
-      panel(o, side, [&](int x, int y) { return encodeNormal(normals.rgb(x, y), Green::Up); }),
-      panel(o, side, [&](int x, int y) { return normalWeights(normals.rgb(x, y)) * 1.5f; }),
-      panel(o, side, [&](int x, int y) { return s(x, y) * 1.5f; }),
-      panel(o, side, [&](int x, int y) { return encodeNormal(recoveredNormal(s(x, y)), Green::Up); }),
-      panel(o, side, [&](int x, int y) { return Vec3(o.at(x, y)[3]); }),
-      panel(o, side, [&](int x, int y) { return Vec3(litBy(s(x, y), right)); }),
-      panel(o, side, [&](int x, int y) { return Vec3(litBy(s(x, y), top)); }),
+      panel(o, side, progress, [&](int x, int y) { return Vec3((field.row(y)[x] - field.lowest) / span); }),
+      panel(o, side, progress, [&](int x, int y) { return encodeNormal(normals.rgb(x, y), Green::Up); }),
+      panel(o, side, progress, [&](int x, int y) { return normalWeights(normals.rgb(x, y)) * 1.5f; }),
+      panel(o, side, progress, [&](int x, int y) { return s(x, y) * 1.5f; }),
+      panel(o, side, progress, [&](int x, int y) { return encodeNormal(recoveredNormal(s(x, y)), Green::Up); }),
+      panel(o, side, progress, [&](int x, int y) { return Vec3(o.at(x, y)[3]); }),
+      panel(o, side, progress, [&](int x, int y) { return Vec3(litBy(s(x, y), right)); }),
+      panel(o, side, progress, [&](int x, int y) { return Vec3(litBy(s(x, y), top)); }),
   };
-  return writeImage(output, panelGrid(panels, 4), {.format = PixelFormat::U8, .channelNames = {}, .metadata = {}});
+  return writeImage(output, panelGrid(panels, 4), {.format = PixelFormat::U8, .channelNames = {}, .metadata = {}},
+                    progress);
 }
 
 }  // namespace lumel::ssbump

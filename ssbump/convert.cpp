@@ -7,8 +7,8 @@
 namespace lumel::ssbump {
 namespace {
 
-Expected<LoadedImage> readMap(const std::filesystem::path& file) {
-  auto loaded = readImage(file);
+Expected<LoadedImage> readMap(const std::filesystem::path& file, const Progress& progress) {
+  auto loaded = readImage(file, progress);
   if (!loaded) return loaded.error();
   if (loaded->paletted) return inputError(file.string() + ": indexed colours; save it as RGB");
   if (loaded->image.channels < 3)
@@ -45,9 +45,10 @@ std::string wordAfter(const std::string& text, const std::string& key) {
 }
 
 /// Blends and fades in the ssbump domain; a normal map has become squared weights before.
-Expected<void> combine(Image& image, const Encoding& encoding, const MapForm& form, const ConvertSettings& settings) {
+Expected<void> combine(Image& image, const Encoding& encoding, const MapForm& form, const ConvertSettings& settings,
+                       const Progress& progress) {
   const auto second = [&](const std::filesystem::path& file) -> Expected<Image> {
-    auto loaded = readMap(file);
+    auto loaded = readMap(file, progress);
     if (!loaded) return loaded.error();
     if (!form.encoding)
       forEachTexel(loaded->image, [&](const Vec3& c) { return normalWeights(decodeNormal(c, form.green)); });
@@ -66,7 +67,7 @@ Expected<void> combine(Image& image, const Encoding& encoding, const MapForm& fo
     blendDetail(image, *detail, encoding, settings.detailRepeats);
   }
   if (!settings.albedo.empty()) {
-    auto albedo = readImage(settings.albedo);
+    auto albedo = readImage(settings.albedo, progress);
     if (!albedo) return albedo.error();
     if (!albedo->isFloat)
       for (float& v : albedo->image.pixels) v = srgbToLinear(v);
@@ -93,8 +94,8 @@ std::optional<MapForm> formFromMetadata(const LoadedImage& image) {
 }
 
 Expected<void> convertMap(const std::filesystem::path& input, const std::filesystem::path& output,
-                          const ConvertSettings& settings) {
-  auto loaded = readMap(input);
+                          const ConvertSettings& settings, const Progress& progress) {
+  auto loaded = readMap(input, progress);
   if (!loaded) return loaded.error();
   const auto form = settings.from ? settings.from : formFromMetadata(*loaded);
   if (!form)
@@ -103,7 +104,7 @@ Expected<void> convertMap(const std::filesystem::path& input, const std::filesys
   Image& image = loaded->image;
   const Encoding encoding = form->encoding.value_or(Encoding{});
   if (!form->encoding) forEachTexel(image, [&](const Vec3& c) { return normalWeights(decodeNormal(c, form->green)); });
-  if (auto done = combine(image, encoding, *form, settings); !done) return done;
+  if (auto done = combine(image, encoding, *form, settings, progress); !done) return done;
 
   std::map<std::string, std::string> metadata;
   if (settings.to.encoding) {
@@ -122,9 +123,9 @@ Expected<void> convertMap(const std::filesystem::path& input, const std::filesys
                                 settings.to.encoding ? MapKind::Weights : MapKind::Normals, settings.options,
                                 loaded->channelNames, metadata);
   if (!writer) return writer.error();
-  if (auto done = writer->write(image); !done) return done;
+  if (auto done = writer->write(image, progress); !done) return done;
   std::vector<PendingFile> files;
-  if (auto done = writer->finish(files); !done) return done;
+  if (auto done = writer->finish(files, progress); !done) return done;
   return putInPlace(files);
 }
 

@@ -26,9 +26,9 @@ struct ConvertSettings {
   MapOptions options;
 };
 
-/// Alpha passes through. Errors: Input (too few channels, not finite, unknown form), Usage, Failed.
+/// Alpha passes through. Errors: Input (too few channels, not finite, unknown form), Usage, Failed, Interrupted.
 Expected<void> convertMap(const std::filesystem::path& input, const std::filesystem::path& output,
-                          const ConvertSettings& settings);
+                          const ConvertSettings& settings, const Progress& progress = noProgress());
 
 /// The form that a file's metadata names, if it names one.
 std::optional<MapForm> formFromMetadata(const LoadedImage& image);

@@ -75,8 +75,8 @@ std::uint16_t toHalf(float value) {
   return bits;
 }
 
-std::vector<std::uint8_t> encodeLevel(const Image& image, DdsFormat format) {
-  if (isBlock(format)) return compressBlocks(image, blockFormat(format));
+std::vector<std::uint8_t> encodeLevel(const Image& image, DdsFormat format, const Progress& progress) {
+  if (isBlock(format)) return compressBlocks(image, blockFormat(format), progress);
   const std::size_t texels = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
   std::vector<std::uint8_t> bytes(texels * (format == DdsFormat::Rgba8 ? 4 : 8));
   for (std::size_t i = 0; i < texels; ++i) {
@@ -100,7 +100,7 @@ std::vector<std::uint8_t> encodeLevel(const Image& image, DdsFormat format) {
 }  // namespace
 
 Expected<PendingFile> writeDds(const std::filesystem::path& file, std::span<const Image> levels, DdsFormat format,
-                               const std::string& note) {
+                               const std::string& note, const Progress& progress) {
   LUMEL_CHECK(!levels.empty());
   const std::string name = file.string();
   for (const Image& level : levels)
@@ -114,9 +114,10 @@ Expected<PendingFile> writeDds(const std::filesystem::path& file, std::span<cons
     return std::fwrite(bytes.data(), 1, bytes.size(), out) == bytes.size();
   };
   bool good = put(header(levels[0].width, levels[0].height, levels.size(), format, note));
-  for (const Image& level : levels) good = good && put(encodeLevel(level, format));
+  for (const Image& level : levels) good = good && put(encodeLevel(level, format, progress)) && !progress.cancelled();
   const int problem = errno;
   good = std::fclose(out) == 0 && good;
+  if (progress.cancelled()) return interrupted();
   if (!good) return failure(name + ": cannot be written: " + std::strerror(problem));
   return pending;
 }

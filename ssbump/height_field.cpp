@@ -1,14 +1,22 @@
 #include "ssbump/height_field.h"
 
 #include <algorithm>
+#include <atomic>
 #include <charconv>
 #include <cmath>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "scene/parallel.h"
 
 namespace lumel::ssbump {
 namespace {
 
 // Beyond this nothing but vertical walls is left, and float positions are too coarse for rays.
 constexpr double kMaxHeightTexels = 1e6;
+
+constexpr std::size_t kTexelsAtOnce = 1 << 16;
 
 int wrapIndex(int i, int size) {
   i %= size;
@@ -29,9 +37,20 @@ float HeightField::at(int x, int y) const {
 }
 
 void HeightField::updateRange() {
-  const auto [lo, hi] = std::minmax_element(texels.begin(), texels.end());
-  lowest = *lo;
-  highest = *hi;
+  std::vector<std::pair<float, float>> ranges((texels.size() + kTexelsAtOnce - 1) / kTexelsAtOnce);
+  parallelFor(texels.size(), kTexelsAtOnce, [&](std::size_t first, std::size_t last) {
+    float low = texels[first], high = low;
+    for (std::size_t i = first; i < last; ++i) {
+      low = std::min(low, texels[i]);
+      high = std::max(high, texels[i]);
+    }
+    ranges[first / kTexelsAtOnce] = {low, high};
+  });
+  std::tie(lowest, highest) = ranges.at(0);
+  for (const auto& [low, high] : ranges) {
+    lowest = std::min(lowest, low);
+    highest = std::max(highest, high);
+  }
 }
 
 Expected<void> parseHeightScale(const std::string& text, HeightOptions& options) {
@@ -119,17 +138,27 @@ Expected<HeightField> heightFieldFromImage(LoadedImage&& loaded, const HeightOpt
   field.wrap = options.wrap;
   field.texels = std::move(loaded.image.pixels);
   const double scale = options.scaleIsPercent ? options.scale / 100 * field.width : options.scale;
-  for (std::size_t i = 0; i < field.texels.size(); ++i) {
-    const double value = field.texels[i];
-    const double texels = scale * (options.invert ? 1 - value : value);
-    if (!(std::abs(texels) <= kMaxHeightTexels)) {
-      const std::string place = name + ": pixel (" + std::to_string(i % static_cast<std::size_t>(field.width)) + ", " +
-                                std::to_string(i / static_cast<std::size_t>(field.width)) + ")";
-      if (!std::isfinite(value)) return inputError(place + ": the height is not a finite number; repair the map");
-      return inputError(place + ": a height of " + std::to_string(texels) +
-                        " texels; at most 1000000 make sense, lower --height-scale");
+  const auto heightOf = [&](double value) { return scale * (options.invert ? 1 - value : value); };
+  std::atomic<std::size_t> firstWrong{field.texels.size()};
+  parallelFor(field.texels.size(), kTexelsAtOnce, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      const double texels = heightOf(field.texels[i]);
+      if (std::abs(texels) <= kMaxHeightTexels) {
+        field.texels[i] = static_cast<float>(texels);
+        continue;
+      }
+      for (std::size_t known = firstWrong; i < known && !firstWrong.compare_exchange_weak(known, i);) {
+      }
+      return;
     }
-    field.texels[i] = static_cast<float>(texels);
+  });
+  if (const std::size_t i = firstWrong; i < field.texels.size()) {
+    const std::size_t width = static_cast<std::size_t>(field.width);
+    const std::string place = name + ": pixel (" + std::to_string(i % width) + ", " + std::to_string(i / width) + ")";
+    if (!std::isfinite(field.texels[i]))
+      return inputError(place + ": the height is not a finite number; repair the map");
+    return inputError(place + ": a height of " + std::to_string(heightOf(field.texels[i])) +
+                      " texels; at most 1000000 make sense, lower --height-scale");
   }
   field.updateRange();
   return field;

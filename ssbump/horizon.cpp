@@ -164,7 +164,7 @@ Horizon::Horizon(const HeightField& field, const HorizonSettings& settings) : se
   if (settings_.reach <= 0) settings_.reach = automaticReach(field);
 }
 
-Image Horizon::occlusion(const TexelRect& rect, std::span<const Lobe> lobes) const {
+Image Horizon::occlusion(const TexelRect& rect, std::span<const Lobe> lobes, Progress& progress) const {
   TexelRect blocks{roundDown(rect.x, kBlockWidth), roundDown(rect.y, kBlockHeight), 0, 0};
   blocks.width = roundUp(rect.x + rect.width, kBlockWidth) - blocks.x;
   blocks.height = roundUp(rect.y + rect.height, kBlockHeight) - blocks.y;
@@ -183,14 +183,18 @@ Image Horizon::occlusion(const TexelRect& rect, std::span<const Lobe> lobes) con
   Image out(rect.width, rect.height, static_cast<int>(lobes.size()));
   const int across = blocks.width / kBlockWidth, down = blocks.height / kBlockHeight;
   parallelFor(static_cast<std::size_t>(across * down), 1, [&](std::size_t first, std::size_t) {
+    if (progress.cancelled()) return;
     const int x0 = blocks.x + static_cast<int>(first) % across * kBlockWidth,
               y0 = blocks.y + static_cast<int>(first) / across * kBlockHeight;
     Block block(tile, x0, y0, lobes.size());
     block.run(settings_.simd);
-    for (int y = std::max(y0, rect.y); y < std::min(y0 + kBlockHeight, rect.y + rect.height); ++y)
-      for (int x = std::max(x0, rect.x); x < std::min(x0 + kBlockWidth, rect.x + rect.width); ++x)
+    const int left = std::max(x0, rect.x), right = std::min(x0 + kBlockWidth, rect.x + rect.width);
+    const int top = std::max(y0, rect.y), bottom = std::min(y0 + kBlockHeight, rect.y + rect.height);
+    for (int y = top; y < bottom; ++y)
+      for (int x = left; x < right; ++x)
         for (std::size_t c = 0; c < lobes.size(); ++c)
           out.at(x - rect.x, y - rect.y)[c] = open[c] > 0 ? std::clamp(block.sum(x, y, c) / open[c], 0.0f, 1.0f) : 1.0f;
+    progress.advance(static_cast<std::uint64_t>(right - left) * static_cast<std::uint64_t>(bottom - top));
   });
   return out;
 }

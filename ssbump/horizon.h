@@ -7,6 +7,7 @@
 #include <span>
 
 #include "scene/image.h"
+#include "scene/progress.h"
 #include "ssbump/horizon_kernel.h"
 #include "ssbump/max_levels.h"
 
@@ -34,7 +35,8 @@ class Horizon {
   /// Visibility in 0..1 around every lobe for the texels of a rectangle inside the map: one channel per lobe, 1 where
   /// nothing occludes. A lobe that lies below the base surface altogether gives 1.
   /// Splits over threads by rows; the values depend neither on threads nor on the rectangle.
-  Image occlusion(const TexelRect& rect, std::span<const Lobe> lobes) const;
+  /// Advances `progress` by texels; once it is cancelled the rest is left out: ask it.
+  Image occlusion(const TexelRect& rect, std::span<const Lobe> lobes, Progress& progress = noProgress()) const;
 
  private:
   HorizonSettings settings_;

@@ -9,16 +9,16 @@
 namespace lumel::ssbump {
 namespace {
 
-Expected<Image> readAlbedo(const std::filesystem::path& file) {
-  auto loaded = readImage(file);
+Expected<Image> readAlbedo(const std::filesystem::path& file, const Progress& progress) {
+  auto loaded = readImage(file, progress);
   if (!loaded) return loaded.error();
   if (!loaded->isFloat)
     for (float& v : loaded->image.pixels) v = srgbToLinear(v);
   return std::move(loaded->image);
 }
 
-Expected<Image> readMask(const std::filesystem::path& file, int width, int height) {
-  auto loaded = readImage(file);
+Expected<Image> readMask(const std::filesystem::path& file, int width, int height, const Progress& progress) {
+  auto loaded = readImage(file, progress);
   if (!loaded) return loaded.error();
   if (loaded->image.width != width || loaded->image.height != height)
     return inputError(file.string() + ": the mask is " + std::to_string(loaded->image.width) + "x" +
@@ -50,7 +50,7 @@ std::vector<std::string> channelNames(std::size_t count, bool alpha) {
 }  // namespace
 
 Expected<MapSet> MapSet::open(const MapSettings& settings, int width, int height, Image alpha,
-                              std::map<std::string, std::string> metadata) {
+                              std::map<std::string, std::string> metadata, const Progress& progress) {
   MapSet set;
   set.settings_ = settings;
   set.width_ = width;
@@ -63,17 +63,17 @@ Expected<MapSet> MapSet::open(const MapSettings& settings, int width, int height
   if (!rnm && set.basisSize_ != 3 && (!settings.detail.empty() || !settings.files.recovered.empty()))
     return usageError("--detail and --save-recovered need the three RNM vectors; leave out --basis");
   if (!settings.mask.empty()) {
-    auto mask = readMask(settings.mask, width, height);
+    auto mask = readMask(settings.mask, width, height, progress);
     if (!mask) return mask.error();
     set.alpha_ = std::move(*mask);
   }
   if (!settings.albedo.empty()) {
-    auto albedo = readAlbedo(settings.albedo);
+    auto albedo = readAlbedo(settings.albedo, progress);
     if (!albedo) return albedo.error();
     set.albedo_ = std::move(*albedo);
   }
   if (!settings.detail.empty()) {
-    auto detail = readImage(settings.detail);
+    auto detail = readImage(settings.detail, progress);
     if (!detail) return detail.error();
     set.detail_ = std::move(detail->image);
   }
@@ -154,13 +154,13 @@ void MapSet::addAlpha(Image& rows) const {
   rows = std::move(with);
 }
 
-Expected<void> MapSet::write(const Image& normals, const Image& occlusion) {
+Expected<void> MapSet::write(const Image& normals, const Image& occlusion, const Progress& progress) {
   LUMEL_CHECK(normals.width == width_ && occlusion.width == width_ && normals.height == occlusion.height);
   LUMEL_CHECK(static_cast<std::size_t>(occlusion.channels) == lobes_.size());
   Image ssbump = compose(normals, occlusion, true);
   modulate(ssbump);
-  const auto put = [](std::optional<MapWriter>& writer, const auto& make) {
-    return writer ? writer->write(make()) : Expected<void>();
+  const auto put = [&](std::optional<MapWriter>& writer, const auto& make) {
+    return writer ? writer->write(make(), progress) : Expected<void>();
   };
   const auto perTexel = [&](int channels, const auto& value) {
     Image out(normals.width, normals.height, channels);
@@ -201,15 +201,15 @@ Expected<void> MapSet::write(const Image& normals, const Image& occlusion) {
     return r;
   addAlpha(ssbump);
   row_ += normals.height;
-  return ssbump_ ? ssbump_->write(ssbump) : Expected<void>();
+  return ssbump_ ? ssbump_->write(ssbump, progress) : Expected<void>();
 }
 
-Expected<void> MapSet::commit() {
+Expected<void> MapSet::commit(const Progress& progress) {
   LUMEL_CHECK(row_ == height_);
   std::vector<PendingFile> files;
   for (auto* writer : {&weights_, &occlusion_, &ambient_, &normal_, &recovered_, &ssbump_})
     if (*writer)
-      if (auto done = (*writer)->finish(files); !done) return done;
+      if (auto done = (*writer)->finish(files, progress); !done) return done;
   return putInPlace(files);
 }
 

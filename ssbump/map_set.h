@@ -39,18 +39,18 @@ struct MapSettings {
 class MapSet {
  public:
   /// `alpha`: the input's own alpha plane (may be empty; a mask file wins). Opens every file before any work is done.
-  /// Errors: Input (albedo, mask or detail), Usage, Failed.
+  /// Errors: Input (albedo, mask or detail), Usage, Failed, Interrupted; of write and commit: Failed, Interrupted.
   static Expected<MapSet> open(const MapSettings& settings, int width, int height, Image alpha,
-                               std::map<std::string, std::string> metadata);
+                               std::map<std::string, std::string> metadata, const Progress& progress);
 
   /// The lobes whose occlusion `write` expects, one channel each, in order.
   const std::vector<Lobe>& lobes() const { return lobes_; }
 
   /// The next rows: unit normals (t, b, n) in three channels, visibility in lobes().size() channels.
-  Expected<void> write(const Image& normals, const Image& occlusion);
+  Expected<void> write(const Image& normals, const Image& occlusion, const Progress& progress);
   /// Completes every file, then puts all in place; if one cannot be, none is replaced. Before it nothing is visible,
   /// and nothing is left if it is not reached.
-  Expected<void> commit();
+  Expected<void> commit(const Progress& progress);
 
   /// "FILE: 12 values above 1 were cut ..." for integer formats.
   std::vector<std::string> warnings() const;

@@ -90,7 +90,7 @@ bool MapWriter::halvesAsItGoes() const {
   return stream_ && options_.mipFilter == MipFilter::Box && width_ % 2 == 0 && height_ % 2 == 0;
 }
 
-Expected<void> MapWriter::write(const Image& rows) {
+Expected<void> MapWriter::write(const Image& rows, const Progress& progress) {
   const bool integer = write_.format == PixelFormat::U8 || write_.format == PixelFormat::U16;
   if (integer)
     for (float v : rows.pixels) clipped_ += v > 1.0f + 1e-6f || v < -1e-6f ? 1 : 0;
@@ -102,34 +102,37 @@ Expected<void> MapWriter::write(const Image& rows) {
     std::copy(part.pixels.begin(), part.pixels.end(), kept_.at(0, half ? row_ / 2 : row_));
   }
   row_ += rows.height;
-  return stream_ ? stream_->write(rows) : Expected<void>();
+  return stream_ ? stream_->write(rows, progress) : Expected<void>();
 }
 
-Expected<PendingFile> MapWriter::finishDds() {
-  std::vector<Image> levels = mipLevels(kept_, options_.mipFilter, options_.wrap);
+Expected<PendingFile> MapWriter::finishDds(const Progress& progress) {
+  std::vector<Image> levels = mipLevels(kept_, options_.mipFilter, options_.wrap, progress);
+  if (progress.cancelled()) return interrupted();
   levels.insert(levels.begin(), std::move(kept_));
   if (kind_ == MapKind::Normals)
     for (std::size_t i = 1; i < levels.size(); ++i) makeUnit(levels[i]);
   const auto note = write_.metadata.find("ImageDescription");
-  return writeDds(file_, levels, ddsFormatFor(options_), note == write_.metadata.end() ? "" : note->second);
+  return writeDds(file_, levels, ddsFormatFor(options_), note == write_.metadata.end() ? "" : note->second,
+                  progress);
 }
 
-Expected<void> MapWriter::finish(std::vector<PendingFile>& files) {
+Expected<void> MapWriter::finish(std::vector<PendingFile>& files, const Progress& progress) {
   const auto keep = [&](Expected<PendingFile> file) -> Expected<void> {
     if (!file) return file.error();
     files.push_back(std::move(*file));
     return {};
   };
-  if (!stream_) return keep(finishDds());
+  if (!stream_) return keep(finishDds(progress));
   if (options_.mips && (width_ > 1 || height_ > 1)) {
-    std::vector<Image> levels = mipLevels(kept_, options_.mipFilter, options_.wrap);
+    std::vector<Image> levels = mipLevels(kept_, options_.mipFilter, options_.wrap, progress);
+    if (progress.cancelled()) return interrupted();
     if (halvesAsItGoes()) levels.insert(levels.begin(), std::move(kept_));
     for (std::size_t i = 0; i < levels.size(); ++i) {
       Image& level = levels[i];
       if (kind_ == MapKind::Normals) makeUnit(level);
       auto writer = ImageWriter::open(mipName(file_, i + 1), level.width, level.height, level.channels, write_);
       if (!writer) return writer.error();
-      if (auto done = writer->write(level); !done) return done;
+      if (auto done = writer->write(level, progress); !done) return done;
       if (auto done = keep(writer->finish()); !done) return done;
     }
   }

@@ -24,7 +24,8 @@ struct MapOptions {
   bool wrap = true;                    // what the mip filter finds beyond the edge
 };
 
-/// Errors of all functions: Failed (cannot write), Usage (unknown extension, too many channels for the format).
+/// Errors of all functions: Failed (cannot write), Usage (unknown extension, too many channels for the format),
+/// Interrupted.
 class MapWriter {
  public:
   static Expected<MapWriter> open(const std::filesystem::path& file, int width, int height, int channels, MapKind kind,
@@ -33,9 +34,9 @@ class MapWriter {
 
   /// The next rows from the top. Memory: a plain map holds no rows; with mips a quarter of the map (box filter, even
   /// sides) or all of it; DDS all of it.
-  Expected<void> write(const Image& rows);
+  Expected<void> write(const Image& rows, const Progress& progress);
   /// Completes the map's files under their temporary names, and adds them to those to be put in place together.
-  Expected<void> finish(std::vector<PendingFile>& files);
+  Expected<void> finish(std::vector<PendingFile>& files, const Progress& progress);
 
   /// Values above 1 or below 0 that an integer format has cut.
   std::size_t clipped() const { return clipped_; }
@@ -43,7 +44,7 @@ class MapWriter {
 
  private:
   bool halvesAsItGoes() const;
-  Expected<PendingFile> finishDds();
+  Expected<PendingFile> finishDds(const Progress& progress);
 
   std::filesystem::path file_;
   int width_ = 0, height_ = 0, channels_ = 0, row_ = 0;

@@ -22,7 +22,8 @@ Expected<BakeReport> bakeMesh(const std::filesystem::path& high, const std::file
   auto maps = MapSet::open(settings.maps, settings.width, settings.height, {},
                            {{"lumel:occlusion", "rays, " + std::to_string(settings.rays.count) +
                                                     " per texel, against " + high.filename().string()},
-                            {"lumel:wrap", low.empty() && settings.wrap ? "yes" : "no"}});
+                            {"lumel:wrap", low.empty() && settings.wrap ? "yes" : "no"}},
+                           progress);
   if (!maps) return maps.error();
   BakeReport report;
   report.width = settings.width;
@@ -31,11 +32,12 @@ Expected<BakeReport> bakeMesh(const std::filesystem::path& high, const std::file
   auto texels = gatherMesh(*highScene, lowScene ? &*lowScene : nullptr, settings, maps->lobes(), progress);
   if (!texels) {
     const Error& e = texels.error();
+    if (e.kind == ErrorKind::Interrupted) return e;
     return Error{e.kind, (e.message.starts_with("low-poly") ? low : high).string() + ": " + e.message};
   }
   report.occlusionSeconds = seconds() - report.prepareSeconds;
-  if (auto done = maps->write(texels->normals, texels->occlusion); !done) return done.error();
-  if (auto done = maps->commit(); !done) return done.error();
+  if (auto done = maps->write(texels->normals, texels->occlusion, progress); !done) return done.error();
+  if (auto done = maps->commit(progress); !done) return done.error();
   report.warnings = maps->warnings();
   for (const std::string& w : highScene->report.warnings) report.warnings.push_back(w);
   return report;

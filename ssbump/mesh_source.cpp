@@ -38,7 +38,7 @@ EmbreeGeometry triangleGeometry(RTCDevice device, const FlatMesh& mesh) {
   return geometry;
 }
 
-Expected<Target> buildTarget(FlatMesh mesh, Vec2 period) {
+Expected<Target> buildTarget(FlatMesh mesh, Vec2 period, const Progress& progress) {
   Target target;
   target.mesh = std::move(mesh);
   auto device = newEmbreeDevice();
@@ -49,7 +49,8 @@ Expected<Target> buildTarget(FlatMesh mesh, Vec2 period) {
   if (!geometry)
     return failure("high-poly mesh: not enough memory for " + std::to_string(target.mesh.triangles()) + " triangles");
   rtcAttachGeometry(target.single.get(), geometry.get());
-  if (auto done = commitScene(target.device.get(), target.single.get(), "high-poly mesh"); !done) return done.error();
+  if (auto done = commitScene(target.device.get(), target.single.get(), "high-poly mesh", progress); !done)
+    return done.error();
   if (period.x <= 0) return target;
 
   // Enough repeats that what lies beyond rises less than a slope of 0.02, and at most four on either side.
@@ -66,7 +67,7 @@ Expected<Target> buildTarget(FlatMesh mesh, Vec2 period) {
       rtcCommitGeometry(instance.get());
       rtcAttachGeometry(target.repeated.get(), instance.get());
     }
-  if (auto done = commitScene(target.device.get(), target.repeated.get(), "repeated high-poly mesh"); !done)
+  if (auto done = commitScene(target.device.get(), target.repeated.get(), "repeated high-poly mesh", progress); !done)
     return done.error();
   return target;
 }
@@ -128,14 +129,15 @@ Found project(const Target& target, const SurfaceTexel& texel, float front, floa
 
 /// Gathers one texel: rays in packets of sixteen from one point.
 void gatherTexel(const Target& target, const SurfaceTexel& texel, const Found& found, const HemisphereSamples& samples,
-                 int count, std::uint64_t key, std::span<const Lobe> lobes, std::span<float> out) {
+                 int count, std::uint64_t key, std::span<const Lobe> lobes, const Progress& progress,
+                 std::span<float> out) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   const float magnitude =
       std::max({std::abs(found.p.x), std::abs(found.p.y), std::abs(found.p.z), 1e-3f * target.mesh.diagonal()});
   const Vec3 origin = found.p + found.geometricNormal * (magnitude * 4e-6f);
   std::vector<double> seen(lobes.size()), all(lobes.size());
-  for (int s = 0; s < count; s += static_cast<int>(kPacket)) {
+  for (int s = 0; s < count && !progress.cancelled(); s += static_cast<int>(kPacket)) {
     alignas(64) RTCRay16 rays{};
     alignas(64) std::array<int, kPacket> valid{};
     std::array<Vec3, kPacket> local;
@@ -205,14 +207,14 @@ Expected<MeshTexels> gatherMesh(const Scene& high, const Scene* low, const MeshS
     back = 1e-3f * std::max(size.x, size.y);
     if (s.wrap) period = size;
   }
-  auto target = buildTarget(std::move(*flat), period);
+  auto target = buildTarget(std::move(*flat), period, progress);
   if (!target) return target.error();
 
   MeshTexels out{Image(s.width, s.height, 3), Image(s.width, s.height, static_cast<int>(lobes.size()), 1.0f),
                  Image(s.width, s.height, 1)};
   const HemisphereSamples samples(s.rays.sampling, s.rays.count, s.rays.seed);
-  progress.begin("rays against the mesh", surface.size());
-  parallelFor(surface.size(), 256, [&](std::size_t first, std::size_t last) {
+  progress.begin("ssbump", surface.size());
+  parallelFor(surface.size(), 16, [&](std::size_t first, std::size_t last) {
     if (progress.cancelled()) return;
     for (std::size_t i = first; i < last; ++i) {
       Vec3 normal(0, 0, 1);
@@ -223,7 +225,7 @@ Expected<MeshTexels> gatherMesh(const Scene& high, const Scene* low, const MeshS
           normal = surface[i].frame.toLocal(found.shadingNormal);
           normal.z = std::max(normal.z, 1e-3f);
           normal = glm::normalize(normal);
-          gatherTexel(*target, surface[i], found, samples, s.rays.count, i, lobes,
+          gatherTexel(*target, surface[i], found, samples, s.rays.count, i, lobes, progress,
                       {&out.occlusion.pixels[i * lobes.size()], lobes.size()});
         }
       }

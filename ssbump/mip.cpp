@@ -58,7 +58,7 @@ int edge(int i, int size, bool wrap) {
 
 }  // namespace
 
-Image halve(const Image& image, MipFilter filter, bool wrap) {
+Image halve(const Image& image, MipFilter filter, bool wrap, const Progress& progress) {
   Image out(std::max(1, image.width / 2), std::max(1, image.height / 2), image.channels);
   const std::vector<Taps> across = makeTaps(image.width, out.width, filter);
   const std::vector<Taps> down = makeTaps(image.height, out.height, filter);
@@ -66,7 +66,7 @@ Image halve(const Image& image, MipFilter filter, bool wrap) {
   parallelFor(static_cast<std::size_t>(out.height), 8, [&](std::size_t first, std::size_t last) {
     const std::size_t rowLength = static_cast<std::size_t>(image.width) * channels;
     std::vector<float> column(rowLength);
-    for (std::size_t y = first; y < last; ++y) {
+    for (std::size_t y = first; y < last && !progress.cancelled(); ++y) {
       std::fill(column.begin(), column.end(), 0.0f);
       for (std::size_t k = 0; k < down[y].weights.size(); ++k) {
         const float* in = image.at(0, edge(down[y].first + static_cast<int>(k), image.height, wrap));
@@ -90,11 +90,11 @@ Image halve(const Image& image, MipFilter filter, bool wrap) {
   return out;
 }
 
-std::vector<Image> mipLevels(const Image& image, MipFilter filter, bool wrap) {
+std::vector<Image> mipLevels(const Image& image, MipFilter filter, bool wrap, const Progress& progress) {
   std::vector<Image> levels;
   const Image* last = &image;
-  while (last->width > 1 || last->height > 1) {
-    levels.push_back(halve(*last, filter, wrap));
+  while ((last->width > 1 || last->height > 1) && !progress.cancelled()) {
+    levels.push_back(halve(*last, filter, wrap, progress));
     last = &levels.back();
   }
   return levels;

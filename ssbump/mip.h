@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "scene/image.h"
+#include "scene/progress.h"
 
 namespace lumel::ssbump {
 
@@ -13,10 +14,11 @@ enum class MipFilter {
 };
 
 /// The next smaller level, max(1, floor(side / 2)) on each side. Kaiser wraps or clamps at the edges.
-Image halve(const Image& image, MipFilter filter, bool wrap);
+/// Once `progress` is cancelled the rest is left out: ask it.
+Image halve(const Image& image, MipFilter filter, bool wrap, const Progress& progress = noProgress());
 
-/// All levels below `image` down to 1x1, largest first.
-std::vector<Image> mipLevels(const Image& image, MipFilter filter, bool wrap);
+/// All levels below `image` down to 1x1, largest first; fewer once `progress` is cancelled.
+std::vector<Image> mipLevels(const Image& image, MipFilter filter, bool wrap, const Progress& progress = noProgress());
 
 /// Number of levels of a full chain, the image itself included.
 int fullMipCount(int width, int height);

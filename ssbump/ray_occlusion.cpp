@@ -110,7 +110,8 @@ class Packet {
 
 }  // namespace
 
-Expected<RayOcclusion> RayOcclusion::build(const HeightField& field, const RaySettings& settings) {
+Expected<RayOcclusion> RayOcclusion::build(const HeightField& field, const RaySettings& settings,
+                                             const Progress& progress) {
   RayOcclusion self(field, settings);
   if (self.settings_.reach <= 0) self.settings_.reach = automaticReach(field);
   auto device = newEmbreeDevice();
@@ -147,23 +148,23 @@ Expected<RayOcclusion> RayOcclusion::build(const HeightField& field, const RaySe
     rtcCommitGeometry(geometry.get());
     rtcAttachGeometry(self.scene_.get(), geometry.get());
   }
-  auto committed = commitScene(self.device_.get(), self.scene_.get(), "height field");
+  auto committed = commitScene(self.device_.get(), self.scene_.get(), "height field", progress);
   if (!committed) return committed.error();
   return self;
 }
 
-Image RayOcclusion::occlusion(const TexelRect& rect, std::span<const Lobe> lobes) const {
+Image RayOcclusion::occlusion(const TexelRect& rect, std::span<const Lobe> lobes, Progress& progress) const {
   Image out(rect.width, rect.height, static_cast<int>(lobes.size()));
   std::vector<std::pair<int, int>> texels;
   texels.reserve(static_cast<std::size_t>(rect.width) * static_cast<std::size_t>(rect.height));
   for (int y = 0; y < rect.height; ++y)
     for (int x = 0; x < rect.width; ++x) texels.emplace_back(rect.x + x, rect.y + y);
-  out.pixels = occlusionAt(texels, lobes);
+  out.pixels = occlusionAt(texels, lobes, progress);
   return out;
 }
 
 std::vector<float> RayOcclusion::occlusionAt(std::span<const std::pair<int, int>> texels,
-                                             std::span<const Lobe> lobes) const {
+                                             std::span<const Lobe> lobes, Progress& progress) const {
   const HemisphereSamples samples(settings_.sampling, settings_.count, settings_.seed);
   const std::size_t channels = lobes.size();
   std::vector<float> out(texels.size() * channels);
@@ -177,6 +178,7 @@ std::vector<float> RayOcclusion::occlusionAt(std::span<const std::pair<int, int>
       const std::size_t lanes = std::min(kPacket, texels.size() - p * kPacket);
       std::array<Vec3, kPacket> directions;
       for (int s = 0; s < settings_.count; ++s) {
+        if (progress.cancelled()) return;
         for (std::size_t i = 0; i < kPacket; ++i) {
           packet.disable(i);
           if (i >= lanes) continue;
@@ -196,6 +198,7 @@ std::vector<float> RayOcclusion::occlusionAt(std::span<const std::pair<int, int>
       }
       for (std::size_t i = 0; i < lanes * channels; ++i)
         out[p * kPacket * channels + i] = all[i] > 0 ? static_cast<float>(seen[i] / all[i]) : 1.0f;
+      progress.advance(lanes);
     }
   });
   return out;

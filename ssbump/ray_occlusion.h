@@ -7,6 +7,7 @@
 
 #include "scene/embree.h"
 #include "scene/image.h"
+#include "scene/progress.h"
 #include "ssbump/height_field.h"
 #include "ssbump/lobe.h"
 #include "ssbump/max_levels.h"
@@ -23,13 +24,16 @@ struct RaySettings {
 
 class RayOcclusion {
  public:
-  /// Builds the triangles: about 200 bytes per texel. The field must outlive the object. Errors: Failed (memory).
-  static Expected<RayOcclusion> build(const HeightField& field, const RaySettings& settings);
+  /// Builds the triangles: about 200 bytes per texel. The field must outlive the object. Errors: Failed (memory),
+  /// Interrupted.
+  static Expected<RayOcclusion> build(const HeightField& field, const RaySettings& settings,
+                                      const Progress& progress = noProgress());
 
   /// Visibility as Horizon::occlusion has it: sum of visible weights over the sum of all weights.
-  Image occlusion(const TexelRect& rect, std::span<const Lobe> lobes) const;
+  Image occlusion(const TexelRect& rect, std::span<const Lobe> lobes, Progress& progress = noProgress()) const;
   /// The same for chosen texels only, row by row of `texels`: out[i * lobes + c].
-  std::vector<float> occlusionAt(std::span<const std::pair<int, int>> texels, std::span<const Lobe> lobes) const;
+  std::vector<float> occlusionAt(std::span<const std::pair<int, int>> texels, std::span<const Lobe> lobes,
+                                 Progress& progress = noProgress()) const;
 
  private:
   RayOcclusion(const HeightField& field, const RaySettings& settings) : field_(&field), settings_(settings) {}

@@ -24,7 +24,7 @@ struct Format {
   const char* name;
   double bits;
   Convention stored;
-  std::function<Image(const Image&)> roundTrip;  // of the stored values
+  std::function<Image(const Image&, const Progress&)> roundTrip;  // of the stored values
 };
 
 Image mapTexels(const Image& in, const std::function<Vec3(const Vec3&)>& f) {
@@ -38,8 +38,8 @@ Image quantise(const Image& in, const Vec3& steps) {
   return mapTexels(in, [&](const Vec3& s) { return glm::round(glm::clamp(s, 0.0f, 1.0f) * steps) / steps; });
 }
 
-Image throughBlocks(const Image& in, BlockFormat format) {
-  return decompressBlocks(compressBlocks(in, format), in.width, in.height, format);
+Image throughBlocks(const Image& in, BlockFormat format, const Progress& progress) {
+  return decompressBlocks(compressBlocks(in, format, progress), in.width, in.height, format);
 }
 
 Image dropAlpha(const Image& in) {
@@ -47,7 +47,7 @@ Image dropAlpha(const Image& in) {
 }
 
 /// One weight in the alpha block, whose eight levels are its own; the colour block's line is left with two.
-Image throughSplit(const Image& in) {
+Image throughSplit(const Image& in, const Progress& progress) {
   Image packed(in.width, in.height, 4);
   for (int y = 0; y < in.height; ++y)
     for (int x = 0; x < in.width; ++x) {
@@ -55,14 +55,14 @@ Image throughSplit(const Image& in) {
       const Vec4 texel(s.x, s.z, 0, s.y);
       std::copy_n(&texel.x, 4, packed.at(x, y));
     }
-  const Image back = throughBlocks(packed, BlockFormat::Bc3);
+  const Image back = throughBlocks(packed, BlockFormat::Bc3, progress);
   Image out(in.width, in.height, 3);
   for (int y = 0; y < in.height; ++y)
     for (int x = 0; x < in.width; ++x) out.setRgb(x, y, {back.at(x, y)[0], back.at(x, y)[3], back.at(x, y)[1]});
   return out;
 }
 
-Image throughThreeBlocks(const Image& in) {
+Image throughThreeBlocks(const Image& in, const Progress& progress) {
   Image two(in.width, in.height, 3), one(in.width, in.height, 1);
   for (int y = 0; y < in.height; ++y)
     for (int x = 0; x < in.width; ++x) {
@@ -70,7 +70,7 @@ Image throughThreeBlocks(const Image& in) {
       two.setRgb(x, y, {s.x, s.y, 0});
       *one.at(x, y) = s.z;
     }
-  const Image a = throughBlocks(two, BlockFormat::Bc5), b = throughBlocks(one, BlockFormat::Bc4);
+  const Image a = throughBlocks(two, BlockFormat::Bc5, progress), b = throughBlocks(one, BlockFormat::Bc4, progress);
   Image out(in.width, in.height, 3);
   for (int y = 0; y < in.height; ++y)
     for (int x = 0; x < in.width; ++x) out.setRgb(x, y, {a.at(x, y)[0], a.at(x, y)[1], b.at(x, y)[0]});
@@ -78,9 +78,9 @@ Image throughThreeBlocks(const Image& in) {
 }
 
 std::vector<Format> formats() {
-  const auto rgb8 = [](const Image& i) { return quantise(i, Vec3(255)); };
-  const auto rgb565 = [](const Image& i) { return quantise(i, Vec3(31, 63, 31)); };
-  const auto bc1 = [](const Image& i) { return dropAlpha(throughBlocks(i, BlockFormat::Bc1)); };
+  const auto rgb8 = [](const Image& i, const Progress&) { return quantise(i, Vec3(255)); };
+  const auto rgb565 = [](const Image& i, const Progress&) { return quantise(i, Vec3(31, 63, 31)); };
+  const auto bc1 = [](const Image& i, const Progress& p) { return dropAlpha(throughBlocks(i, BlockFormat::Bc1, p)); };
   return {{"RGB8", 24, Convention::Squared, rgb8},
           {"RGB8 linear", 24, Convention::Linear, rgb8},
           {"RGB565", 16, Convention::Squared, rgb565},
@@ -93,10 +93,10 @@ std::vector<Format> formats() {
           {"BC1 linear", 4, Convention::Linear, bc1}};
 }
 
-Image storedAndBack(const Image& map, const Format& format) {
+Image storedAndBack(const Image& map, const Format& format, const Progress& progress) {
   Image stored = map;
   convert(stored, {}, {format.stored, Hand::Right});
-  Image back = format.roundTrip(stored);
+  Image back = format.roundTrip(stored, progress);
   convert(back, {format.stored, Hand::Right}, {});
   return back;
 }
@@ -119,12 +119,13 @@ double degreesBetween(const Vec3& a, const Vec3& b) {
   return 2 * std::asin(std::min(1.0, 0.5 * static_cast<double>(glm::length(a - b)))) * 180 / std::numbers::pi;
 }
 
-StudyRow compare(const Image& truth, const Image& other) {
+StudyRow compare(const Image& truth, const Image& other, Progress& progress) {
   StudyRow row;
   const std::vector<Vec3> directions = lights();
   std::vector<double> angles;
   double weights = 0, light = 0;
-  for (int y = 0; y < truth.height; ++y)
+  for (int y = 0; y < truth.height; ++y) {
+    if (progress.cancelled()) return row;
     for (int x = 0; x < truth.width; ++x) {
       const Vec3 a = truth.rgb(x, y), b = other.rgb(x, y);
       for (int c = 0; c < 3; ++c) {
@@ -140,6 +141,8 @@ StudyRow compare(const Image& truth, const Image& other) {
       }
       angles.push_back(degreesBetween(recoveredNormal(a), recoveredNormal(b)));
     }
+    progress.advance(static_cast<std::uint64_t>(truth.width));
+  }
   const double texels = static_cast<double>(angles.size());
   row.weightRmse = std::sqrt(weights / (3 * texels));
   row.lightRmse = std::sqrt(light / (static_cast<double>(directions.size()) * texels));
@@ -178,14 +181,14 @@ std::string table(const std::vector<StudyRow>& rows, const std::vector<MipRow>& 
   return text;
 }
 
-Image studyPicture(const Image& map) {
+Image studyPicture(const Image& map, const Progress& progress) {
   const int w = std::min(map.width, 256), h = std::min(map.height, 256);
   Image crop(w, h, 3);
   for (int y = 0; y < h; ++y) std::copy_n(map.at(0, y), w * 3, crop.at(0, y));
   const Vec3 right = glm::normalize(Vec3(1, 0, 0.5f));
   std::vector<Image> panels;
   for (const Format& format : formats()) {
-    const Image back = storedAndBack(crop, format);
+    const Image back = storedAndBack(crop, format, progress);
     Image error(w, h, 3);
     for (std::size_t i = 0; i < error.pixels.size(); ++i)
       error.pixels[i] = 8 * std::abs(back.pixels[i] - crop.pixels[i]);
@@ -213,56 +216,72 @@ Expected<void> writeText(const std::filesystem::path& file, const std::string& t
 
 }  // namespace
 
-std::vector<StudyRow> studyFormats(const Image& map, int lastMip) {
+std::vector<StudyRow> studyFormats(const Image& map, int lastMip, Progress& progress) {
   const std::vector<Image> levels = levelsTo(map, lastMip);
   std::vector<StudyRow> rows;
+  std::uint64_t texels = 0;
+  for (const Image& level : levels) texels += level.pixels.size() / 3;
+  progress.begin("study", texels * formats().size());
   for (const Format& format : formats())
-    for (std::size_t mip = 0; mip < levels.size(); ++mip) {
-      StudyRow row = compare(levels[mip], storedAndBack(levels[mip], format));
+    for (std::size_t mip = 0; mip < levels.size() && !progress.cancelled(); ++mip) {
+      StudyRow row = compare(levels[mip], storedAndBack(levels[mip], format, progress), progress);
       row.format = format.name;
       row.bitsPerTexel = format.bits;
       row.mip = static_cast<int>(mip);
       rows.push_back(row);
     }
+  progress.end();
   return rows;
 }
 
-std::vector<MipRow> studyMips(const Image& map, int lastMip) {
+std::vector<MipRow> studyMips(const Image& map, int lastMip, const Progress& progress) {
   const std::vector<Image> levels = levelsTo(map, lastMip);
+  const auto texels = [&](std::size_t mip) { return static_cast<double>(levels[mip].pixels.size() / 3); };
+  std::vector<MipRow> rows(levels.size() - 1);
   Image normals = mapTexels(map, [](const Vec3& s) { return recoveredNormal(s); });
-  const std::vector<Vec3> directions = lights();
-  std::vector<Image> lit;
-  for (const Vec3& l : directions) lit.push_back(mapTexels(map, [&](const Vec3& s) { return Vec3(3 * litBy(s, l)); }));
-  std::vector<MipRow> rows;
   for (std::size_t mip = 1; mip < levels.size(); ++mip) {
-    normals = halve(normals, MipFilter::Box, true);
-    for (Image& image : lit) image = halve(image, MipFilter::Box, true);
-    MipRow row{static_cast<int>(mip), 0, 0};
     const Image& level = levels[mip];
+    normals = halve(normals, MipFilter::Box, true);
+    MipRow& row = rows[mip - 1];
+    row.mip = static_cast<int>(mip);
     for (int y = 0; y < level.height; ++y)
-      for (int x = 0; x < level.width; ++x) {
-        const Vec3 mean = normals.rgb(x, y);
-        row.normalMeanDegrees += degreesBetween(recoveredNormal(level.rgb(x, y)), glm::normalize(mean));
-        for (std::size_t k = 0; k < directions.size(); ++k) {
-          const double d = static_cast<double>(3 * litBy(level.rgb(x, y), directions[k]) - lit[k].at(x, y)[0]);
-          row.lightRmse += d * d;
-        }
-      }
-    const double texels = static_cast<double>(level.width) * level.height;
-    row.normalMeanDegrees /= texels;
-    row.lightRmse = std::sqrt(row.lightRmse / (texels * static_cast<double>(directions.size())));
-    rows.push_back(row);
+      for (int x = 0; x < level.width; ++x)
+        row.normalMeanDegrees += degreesBetween(recoveredNormal(level.rgb(x, y)), glm::normalize(normals.rgb(x, y)));
+    row.normalMeanDegrees /= texels(mip);
   }
+  const std::vector<Vec3> directions = lights();
+  for (const Vec3& l : directions) {
+    const auto light = [&](const Image& level) {
+      Image lit(level.width, level.height, 1);
+      for (int y = 0; y < lit.height && !progress.cancelled(); ++y)
+        for (int x = 0; x < lit.width; ++x) *lit.at(x, y) = 3 * litBy(level.rgb(x, y), l);
+      return lit;
+    };
+    Image mean = light(map);
+    for (std::size_t mip = 1; mip < levels.size(); ++mip) {
+      mean = halve(mean, MipFilter::Box, true, progress);
+      const Image lit = light(levels[mip]);
+      for (std::size_t i = 0; i < lit.pixels.size(); ++i) {
+        const double d = static_cast<double>(lit.pixels[i] - mean.pixels[i]);
+        rows[mip - 1].lightRmse += d * d;
+      }
+    }
+  }
+  for (MipRow& row : rows)
+    row.lightRmse = std::sqrt(row.lightRmse / (texels(static_cast<std::size_t>(row.mip)) * static_cast<double>(directions.size())));
   return rows;
 }
 
-Expected<void> writeStudy(const Image& map, const std::string& title, const std::filesystem::path& folder) {
+Expected<void> writeStudy(const Image& map, const std::string& title, const std::filesystem::path& folder,
+                          Progress& progress) {
+  const std::string text = table(studyFormats(map, 3, progress), studyMips(map, 6, progress), title);
+  const Image picture = studyPicture(map, progress);
+  if (progress.cancelled()) return interrupted();
   std::error_code ec;
   std::filesystem::create_directories(folder, ec);
   if (ec) return failure(folder.string() + ": cannot be made: " + ec.message());
-  if (auto done = writeText(folder / "study.md", table(studyFormats(map, 3), studyMips(map, 6), title)); !done)
-    return done;
-  return writeImage(folder / "study.png", studyPicture(map),
+  if (auto done = writeText(folder / "study.md", text); !done) return done;
+  return writeImage(folder / "study.png", picture,
                     {.format = PixelFormat::U8, .channelNames = {}, .metadata = {}});
 }
 

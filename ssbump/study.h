@@ -7,6 +7,7 @@
 
 #include "scene/expected.h"
 #include "scene/image.h"
+#include "scene/progress.h"
 
 namespace lumel::ssbump {
 
@@ -24,7 +25,8 @@ struct StudyRow {
 /// BC1 in both; BC3 split (one weight in the alpha block, two in the colour block), 8 bits per texel as BC7 has;
 /// BC5 + BC4, one 4-bit block per weight. Neither libsquish nor NVTT 2.0 has BC7.
 /// `map`: squared weights, right-handed, three channels. Mips 0 to `lastMip` (box filter).
-std::vector<StudyRow> studyFormats(const Image& map, int lastMip);
+/// `progress` advances by texels and formats; once it is cancelled rows are missing: ask it.
+std::vector<StudyRow> studyFormats(const Image& map, int lastMip, Progress& progress = noProgress());
 
 /// A mip level's recovered normals against the mean of the full map's, and its lighting against the mean lighting of
 /// the texels below it (equal for a box filter: lighting is linear in the weights).
@@ -33,10 +35,11 @@ struct MipRow {
   double lightRmse = 0;
   double normalMeanDegrees = 0;
 };
-std::vector<MipRow> studyMips(const Image& map, int lastMip);
+std::vector<MipRow> studyMips(const Image& map, int lastMip, const Progress& progress = noProgress());
 
 /// Writes study.md (both tables), and study.png: a row of panels per format of mip 0: weights, error times 8, lit from
-/// the right, recovered normals. Errors: Failed.
-Expected<void> writeStudy(const Image& map, const std::string& title, const std::filesystem::path& folder);
+/// the right, recovered normals. Errors: Failed, Interrupted.
+Expected<void> writeStudy(const Image& map, const std::string& title, const std::filesystem::path& folder,
+                          Progress& progress = noProgress());
 
 }  // namespace lumel::ssbump

@@ -9,15 +9,20 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <cstring>
+#include <ctime>
 #include <fstream>
+#include <functional>
 
 namespace lumel::cli {
 namespace {
 
 namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
 
-[[noreturn]] void becomeLumel(const std::vector<std::string>& arguments) {
+[[noreturn]] void becomeLumel(const std::vector<std::string>& arguments, const Surroundings& surroundings) {
+  if (!surroundings.folder.empty() && chdir(surroundings.folder.c_str()) != 0) _exit(126);
   std::vector<char*> argv{const_cast<char*>(LUMEL_BINARY)};
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
@@ -40,7 +45,22 @@ bool readSome(int descriptor, std::string& into) {
   return true;
 }
 
-Outcome runWatching(const std::vector<std::string>& arguments, const std::string* sign) {
+/// CPU time that a process has used so far, all threads.
+double cpuSecondsOf(pid_t process) {
+  clockid_t clock;
+  timespec used{};
+  if (clock_getcpuclockid(process, &clock) != 0 || clock_gettime(clock, &used) != 0) return 0;
+  return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+}
+
+/// When to send a signal to a running process; never, where `signal` is 0.
+struct Interruption {
+  int signal = 0;
+  std::function<bool(pid_t process, const Outcome& soFar)> isDue;
+};
+
+Outcome runWatching(const std::vector<std::string>& arguments, const Interruption& interruption,
+                    const Surroundings& surroundings) {
   int out[2];
   int err[2];
   if (pipe(out) != 0 || pipe(err) != 0) return {};
@@ -49,28 +69,30 @@ Outcome runWatching(const std::vector<std::string>& arguments, const std::string
     dup2(out[1], STDOUT_FILENO);
     dup2(err[1], STDERR_FILENO);
     for (int descriptor : {out[0], out[1], err[0], err[1]}) close(descriptor);
-    becomeLumel(arguments);
+    becomeLumel(arguments, surroundings);
   }
   close(out[1]);
   close(err[1]);
   Outcome outcome;
   bool outOpen = true;
   bool errOpen = true;
-  bool sent = false;
+  std::optional<Clock::time_point> sent;
   while (outOpen || errOpen) {
     std::array<pollfd, 2> watched = {pollfd{outOpen ? out[0] : -1, POLLIN, 0},
                                      pollfd{errOpen ? err[0] : -1, POLLIN, 0}};
-    poll(watched.data(), watched.size(), -1);
+    const bool waiting = interruption.signal != 0 && !sent;
+    poll(watched.data(), watched.size(), waiting ? 10 : -1);
     if (watched[0].revents != 0) outOpen = readSome(out[0], outcome.out);
     if (watched[1].revents != 0) errOpen = readSome(err[0], outcome.err);
-    if (sign && !sent && outcome.err.find(*sign) != std::string::npos) {
-      kill(child, SIGINT);
-      sent = true;
+    if (waiting && interruption.isDue(child, outcome)) {
+      kill(child, interruption.signal);
+      sent = Clock::now();
     }
   }
   close(out[0]);
   close(err[0]);
   outcome.exitCode = waitFor(child);
+  if (sent) outcome.secondsToStop = std::chrono::duration<double>(Clock::now() - *sent).count();
   return outcome;
 }
 
@@ -89,17 +111,26 @@ std::string base64(const std::vector<std::uint8_t>& bytes) {
 
 }  // namespace
 
-Outcome run(const std::vector<std::string>& arguments) { return runWatching(arguments, nullptr); }
-
-Outcome runAndInterrupt(const std::vector<std::string>& arguments, const std::string& sign) {
-  return runWatching(arguments, &sign);
+Outcome run(const std::vector<std::string>& arguments, const Surroundings& surroundings) {
+  return runWatching(arguments, {}, surroundings);
 }
 
-std::optional<Outcome> runOnTerminal(const std::vector<std::string>& arguments) {
+Outcome runAndInterrupt(const std::vector<std::string>& arguments, const std::string& sign) {
+  const auto seen = [&](pid_t, const Outcome& soFar) { return soFar.err.find(sign) != std::string::npos; };
+  return runWatching(arguments, {SIGINT, seen}, {});
+}
+
+Outcome runAndInterrupt(const std::vector<std::string>& arguments, double cpuSeconds, int signal,
+                        const Surroundings& surroundings) {
+  const auto worked = [&](pid_t process, const Outcome&) { return cpuSecondsOf(process) >= cpuSeconds; };
+  return runWatching(arguments, {signal, worked}, surroundings);
+}
+
+std::optional<Outcome> runOnTerminal(const std::vector<std::string>& arguments, const Surroundings& surroundings) {
   int terminal = -1;
   const pid_t child = forkpty(&terminal, nullptr, nullptr, nullptr);
   if (child < 0) return std::nullopt;
-  if (child == 0) becomeLumel(arguments);
+  if (child == 0) becomeLumel(arguments, surroundings);
   Outcome outcome;
   while (readSome(terminal, outcome.out)) {
   }

@@ -16,16 +16,26 @@ struct Outcome {
   int exitCode = -1;  // 128 + signal where one ended it
   std::string out;
   std::string err;
+  double secondsToStop = 0;  // from the signal, where one was sent, to the end
+};
+
+/// What a process starts with.
+struct Surroundings {
+  std::filesystem::path folder;  // empty: the test's own
 };
 
 /// Runs `lumel ARGUMENTS...` with both outputs in pipes.
-Outcome run(const std::vector<std::string>& arguments);
+Outcome run(const std::vector<std::string>& arguments, const Surroundings& surroundings = {});
 
 /// The same with all output on a terminal; `out` holds what the terminal got. Nothing where the system has none to give.
-std::optional<Outcome> runOnTerminal(const std::vector<std::string>& arguments);
+std::optional<Outcome> runOnTerminal(const std::vector<std::string>& arguments, const Surroundings& surroundings = {});
 
 /// Starts it, sends SIGINT once its standard error holds `sign`, and waits for the end.
 Outcome runAndInterrupt(const std::vector<std::string>& arguments, const std::string& sign);
+
+/// The same, once it has used so much CPU time: a loaded machine delays the signal as it delays the work.
+Outcome runAndInterrupt(const std::vector<std::string>& arguments, double cpuSeconds, int signal,
+                        const Surroundings& surroundings = {});
 
 /// An empty folder of the running test.
 std::filesystem::path scratch();

@@ -1,14 +1,15 @@
 // `lumel ssbump` as a user runs it: exit codes, messages, files. LUMEL_BINARY is the built program.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 
-#include <array>
 #include <cmath>
-#include <cstdio>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 
 #include "scene/image_io.h"
+#include "tests/cli/harness.h"
 #include "tests/ssbump/fields.h"
 
 namespace lumel::ssbump {
@@ -24,10 +25,7 @@ struct Ran {
 class SsbumpCli : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) /
-              (std::string("lumel-cli-ssbump-") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
+    folder_ = cli::scratch();
     const HeightField field = fields::fractal(64, 64, 1, 4);
     Image grey(64, 64, 1);
     grey.pixels = field.texels;
@@ -35,16 +33,18 @@ class SsbumpCli : public testing::Test {
   }
 
   /// Arguments as on a command line, run in the test's folder.
+  static std::vector<std::string> words(const std::string& arguments) {
+    std::istringstream stream("ssbump " + arguments);
+    return {std::istream_iterator<std::string>(stream), {}};
+  }
   Ran lumel(const std::string& arguments) const {
-    const std::string command = "cd '" + folder_.string() + "' && '" LUMEL_BINARY "' ssbump " + arguments + " 2>&1";
-    std::FILE* pipe = popen(command.c_str(), "r");
-    EXPECT_NE(pipe, nullptr);
-    Ran ran;
-    std::array<char, 512> buffer;
-    while (pipe && std::fgets(buffer.data(), buffer.size(), pipe)) ran.output += buffer.data();
-    const int status = pipe ? pclose(pipe) : -1;
-    ran.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    return ran;
+    const cli::Outcome outcome = cli::run(words(arguments), {.folder = folder_});
+    return {outcome.exitCode, outcome.out + outcome.err};
+  }
+  /// A square of 4 m with a fence across it.
+  void writeTile() const {
+    std::ofstream(folder_ / "tile.obj")
+        << "v 0 0 0\nv 4 0 0\nv 4 0 4\nv 0 0 4\nv 2 0 0\nv 2 1 0\nv 2 1 4\nv 2 0 4\nf 1 4 3 2\nf 5 6 7 8\n";
   }
   bool exists(const std::string& name) const { return fs::exists(folder_ / name); }
   Image read(const std::string& name) const {
@@ -136,9 +136,52 @@ TEST_F(SsbumpCli, BadInputIsNamedAndLeavesNothing) {
   }
 }
 
+TEST_F(SsbumpCli, StopsWhenAsked) {
+  const HeightField field = fields::fractal(2048, 2048, 1, 4);
+  Image large(2048, 2048, 1);
+  large.pixels = field.texels;
+  ASSERT_TRUE(writeImage(folder_ / "l.png", large, {.format = PixelFormat::U16, .channelNames = {}, .metadata = {}}));
+  writeTile();
+  std::ofstream(folder_ / "s.png") << "an older map";
+  const auto before = cli::readFolder(folder_);
+  struct Work {
+    const char* arguments;
+    int signal;
+    double cpuSeconds;  // by then it is where it spends its time, which is a quarter of a minute and more
+  };
+  for (const Work& work : {
+           Work{"h.png -o s.png --save-ao ao.png --method rays --rays 1000000", SIGINT, 1},
+           Work{"h.png -o s.png --method rays --rays 1000000", SIGTERM, 1},
+           Work{"tile.obj -o s.png --rays 1000000", SIGINT, 1},
+           Work{"l.png -o s.png --save-normal n.exr --azimuths 1024 --height-scale 1000 --threads 1", SIGINT, 2},
+           Work{"l.png -o s.png --bilateral 64 --bilateral-threshold 50 --threads 1", SIGINT, 2},
+           Work{"l.png --study study --azimuths 4 --reach 8", SIGINT, 3},
+       }) {
+    const cli::Outcome stopped =
+        cli::runAndInterrupt(words(work.arguments), work.cpuSeconds, work.signal, {.folder = folder_});
+    EXPECT_EQ(stopped.exitCode, 130) << work.arguments;
+    EXPECT_EQ(stopped.err, "lumel: interrupted\n") << work.arguments;
+    EXPECT_LT(stopped.secondsToStop, 6) << work.arguments << ": a tenth of a second on an idle machine";
+    EXPECT_TRUE(cli::readFolder(folder_) == before) << work.arguments;
+  }
+}
+
+TEST_F(SsbumpCli, ProgressOnATerminalOnly) {
+  // A second and more of work: the line is drawn every fifth of a second.
+  const auto work = words("h.png -o s.png --method rays --rays 4000");
+  const auto terminal = cli::runOnTerminal(work, {.folder = folder_});
+  if (!terminal) GTEST_SKIP() << "no pseudo-terminal here";
+  EXPECT_EQ(terminal->exitCode, 0) << terminal->out;
+  EXPECT_NE(terminal->out.find("ssbump "), std::string::npos) << terminal->out;
+  EXPECT_NE(terminal->out.find("% "), std::string::npos) << terminal->out;
+  EXPECT_NE(terminal->out.find(" left"), std::string::npos) << terminal->out;
+  const cli::Outcome piped = cli::run(words("h.png -o s.png --method rays --rays 2000 -q"), {.folder = folder_});
+  EXPECT_EQ(piped.exitCode, 0);
+  EXPECT_EQ(piped.out + piped.err, "");
+}
+
 TEST_F(SsbumpCli, MeshesOverAFlatTile) {
-  std::ofstream(folder_ / "tile.obj") << "v 0 0 0\nv 4 0 0\nv 4 0 4\nv 0 0 4\nv 2 0 0\nv 2 1 0\nv 2 1 4\nv 2 0 4\n"
-                                         "f 1 4 3 2\nf 5 6 7 8\n";
+  writeTile();
   const Ran ran = lumel("tile.obj -o s.exr --bits float --save-occlusion o.exr --width 16 --height 16 --rays 256 -q");
   ASSERT_EQ(ran.code, 0) << ran.output;
   const Image o = read("o.exr");
