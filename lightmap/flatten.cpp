@@ -4,6 +4,7 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 
+#include "lightmap/chart_rim.h"
 #include "lightmap/nested_dissection.h"
 
 namespace lumel {
@@ -322,6 +323,7 @@ Flattening flatten(const ChartMesh& chart, const FlattenOptions& options) {
       scaleToSurface(chart, result.uvs);
       good = isGood(chart, result.uvs, options);
     }
+    const bool isFlat = good;
     if (!good) {
       result.uvs = unroll(chart);
       good = isDevelopable(chart, result.uvs, options);
@@ -334,6 +336,7 @@ Flattening flatten(const ChartMesh& chart, const FlattenOptions& options) {
       good = relax(chart, result.uvs, options);
     }
     if (!good || overlapsItself(chart, result.uvs, kOverlapTexels)) return result;
+    if (!isFlat && mixesFarParts(chart, result.uvs)) return result;
   }
   alignToAxes(chart, result.uvs);
   result.valid = packsWell(result.uvs, surfaceArea(chart), options.largestSide);
