@@ -150,7 +150,7 @@ class Builder {
       std::uint32_t forward, backward;
     };
     std::vector<Pair> pairs;
-    constexpr std::size_t kMostSides = 64;  // a fan of more sheets is left as separate sheets: n^2 pairs
+    constexpr std::size_t kMostSides = 256;  // a fan of more sheets is left as separate sheets: n^2 pairs
     if (count > kMostSides) return;
     for (std::size_t i = 0; i < count; ++i)
       for (std::size_t j = 0; j < count; ++j) {
