@@ -10,13 +10,13 @@
 #include "lightmap/chart_growing.h"
 #include "lightmap/chart_sheet.h"
 #include "lightmap/flatten.h"
+#include "lightmap/frame_slits.h"
 #include "scene/parallel.h"
 
 namespace lumel {
 namespace {
 
 constexpr double kSmoothCrease = 0.25;  // weight of a crease that is shaded smooth
-constexpr double kTinyTexels = 4.0;     // charts of less area should find a neighbour if any way can be found
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 struct Border {
@@ -50,6 +50,12 @@ double creaseLimit(double area, double perimeter) {
   return 0.5;                                 // 60 degrees
 }
 
+enum class Phase {
+  All,
+  Small,         // what is below kTinyTexels, harder: squeezed and by any edge
+  SmallTogether  // ... and what is left of that with each other, over narrower gaps between frames
+};
+
 class PartMerger {
  public:
   PartMerger(const HalfEdgeMesh& mesh, std::vector<FlatChart*> charts, const std::vector<std::uint32_t>& localTriangle,
@@ -58,16 +64,11 @@ class PartMerger {
 
   std::vector<FlatChart> run() {
     makeBorders();
-    while (!queue_.empty()) {
-      const Candidate top = queue_.top();
-      queue_.pop();
-      if (!borders_.isAlive(top.border)) continue;
-      const double now = cost(top.border);
-      if (now > top.cost * 1.0001 + 1e-9) {
-        if (std::isfinite(now)) queue_.push({static_cast<float>(now), top.border});
-        continue;
-      }
-      tryMerge(top.border);
+    for (const Phase phase : {Phase::All, Phase::Small, Phase::SmallTogether}) {
+      phase_ = phase;
+      for (std::uint32_t i = 0; i < borders_.size(); ++i)
+        if (borders_.isAlive(i)) push(i);
+      merge();
     }
     return collect();
   }
@@ -82,7 +83,20 @@ class PartMerger {
         for (std::uint32_t k = 0; k < 3; ++k)
           if (mesh_.neighbours[t][k] >= 0) addSide(c, {t, k});
     }
-    for (std::uint32_t i = 0; i < borders_.size(); ++i) push(i);
+  }
+
+  void merge() {
+    while (!queue_.empty()) {
+      const Candidate top = queue_.top();
+      queue_.pop();
+      if (!borders_.isAlive(top.border)) continue;
+      const double now = cost(top.border);
+      if (now > top.cost * 1.0001 + 1e-9) {
+        if (std::isfinite(now)) queue_.push({static_cast<float>(now), top.border});
+        continue;
+      }
+      tryMerge(top.border);
+    }
   }
 
   void addSide(std::uint32_t c, MeshEdge edge) {
@@ -108,6 +122,8 @@ class PartMerger {
     const ChartSheet::Chart& a = sheet_.chart(borders_.ends(index)[0]);
     const ChartSheet::Chart& b = sheet_.chart(borders_.ends(index)[1]);
     const ChartSheet::Chart& smaller = a.normals.area < b.normals.area ? a : b;
+    if (phase_ != Phase::All && smaller.normals.area >= kTinyTexels) return kNever;
+    if (phase_ == Phase::SmallTogether && a.normals.area + b.normals.area >= kTinyTexels) return kNever;
     const double crease = border.crease / border.length;
     if (crease > creaseLimit(smaller.normals.area, smaller.perimeter)) return kNever;
     return withoutNoise(crease + 0.5 * std::max(0.0, 1 - 2 * border.length / smaller.perimeter));
@@ -116,14 +132,24 @@ class PartMerger {
   void tryMerge(std::uint32_t index) {
     Border& border = borders_[index];
     auto [into, from] = borders_.ends(index);
-    if (sheet_.chart(into).triangles.size() < sheet_.chart(from).triangles.size()) std::swap(into, from);
+    const auto size = [this](std::uint32_t c) {
+      return phase_ == Phase::All ? static_cast<double>(sheet_.chart(c).triangles.size()) : sheet_.chart(c).normals.area;
+    };
+    if (size(into) < size(from)) std::swap(into, from);
     std::vector<MeshEdge> shared;
     for (const MeshEdge edge : border.edges) shared.push_back(sheet_.chartOf(edge.triangle) == into ? edge : sheet_.beyond(edge));
     // A long common border first; what meets by little of it only where no flattening of both does better.
     constexpr double kMuch = 0.25, kLittle = 0.12;  // of the border: half a pipe meets the other half along one of two
-    if (moveTo(border, into, from, shared, kMuch) || flattenAsOne(border, into, from, shared) || moveTo(border, into, from, shared, kLittle))
+    if (moveTo(border, into, from, shared, kMuch) || flattenAsOne(border, into, from, shared) ||
+        moveTo(border, into, from, shared, kLittle) || hang(into, from, shared)) {
       merged(into, from);
+    } else if (sheet_.chart(into).normals.area < kTinyTexels) {
+      for (MeshEdge& edge : shared) edge = sheet_.beyond(edge);
+      if (hang(from, into, shared)) merged(from, into);
+    }
   }
+
+  double frameGap() const { return phase_ == Phase::SmallTogether ? kSmallFrameGap : kFrameGap; }
 
   /// Joins the charts as they are, by a rigid motion that lets at least a share of the border meet.
   bool moveTo(const Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared, double leastMatch) {
@@ -131,9 +157,24 @@ class PartMerger {
     for (const Fit& fit : sheet_.fits(shared, smallChartSlack(smaller))) {
       // What is too small for a chart of its own may hang on by any edge.
       if (smaller >= kTinyTexels && fit.length < leastMatch * border.length) return false;
-      if (!sheet_.mayJoin(into, from, fit, options_)) continue;
+      if (!sheet_.mayJoin(into, from, fit, frameGap(), options_)) continue;
       sheet_.join(into, from, fit);
       return true;
+    }
+    return false;
+  }
+
+  /// Hangs a small chart on by any one edge, squeezed as far as its stretch may go where it does not fit otherwise.
+  bool hang(std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared) {
+    if (phase_ == Phase::All) return false;
+    const double limit = options_.maxStretch * std::sqrt(smallChartSlack(sheet_.chart(from).normals.area));
+    for (const double scale : {1.0, 0.7, 0.5, 0.35}) {
+      if (scale * limit < 1) break;
+      for (const Fit& fit : sheet_.hangings(shared, scale)) {
+        if (!sheet_.mayJoin(into, from, fit, frameGap(), options_)) continue;
+        sheet_.join(into, from, fit);
+        return true;
+      }
     }
     return false;
   }
@@ -148,7 +189,8 @@ class PartMerger {
     const ChartSheet::Chart& b = sheet_.chart(from);
     if (a.triangles.size() + b.triangles.size() > kMostTriangles) return false;
     const NormalMoments both(a.normals, b.normals);
-    if (both.area < kGrowth * border.refusedArea || border.length < kLeastBorder * std::min(a.perimeter, b.perimeter)) return false;
+    if (both.area < kGrowth * border.refusedArea) return false;
+    if (phase_ == Phase::All && border.length < kLeastBorder * std::min(a.perimeter, b.perimeter)) return false;
     border.refusedArea = both.area;
     if (both.coneVariance() > kMostConeVariance * smallChartSlack(both.area)) return false;
     FlatChart flat;
@@ -156,7 +198,7 @@ class PartMerger {
     Flattening flattened = flatten(flat.mesh, {options_.maxStretch, options_.largestSide});
     if (!flattened.valid) return false;
     flat.uvs = std::move(flattened.uvs);
-    if (sheet_.closesBreak(into, from, flat)) return false;
+    if (sheet_.closesBreak(into, from, flat, frameGap())) return false;
     sheet_.replace(into, from, flat);
     return true;
   }
@@ -194,6 +236,7 @@ class PartMerger {
   std::vector<FlatChart*> charts_;
   ChartSheet sheet_;
   BorderGraph<Border> borders_;
+  Phase phase_ = Phase::All;
   std::vector<std::vector<std::uint32_t>> members_;    // per chart: the charts that it is made of
   std::priority_queue<Candidate> queue_;
 };

@@ -57,6 +57,9 @@ struct Stretch {
 double surfaceArea(const ChartMesh& chart);
 Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, double limit);
 
+/// Charts of less area (texels) should find a neighbour if any way can be found: they are mostly gutter.
+inline constexpr double kTinyTexels = 4.0;
+
 /// How much more bend and stretch a chart of this area (texels) may have than a large one, 1 .. 10: distortion that no
 /// texel can resolve matters less than a chart of its own with a gutter around it.
 inline double smallChartSlack(double area) {

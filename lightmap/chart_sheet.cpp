@@ -21,7 +21,7 @@ std::uint64_t cellKey(std::int64_t x, std::int64_t y) {
 double doubleArea(const std::array<Vec2d, 3>& t) { return cross2(t[1] - t[0], t[2] - t[0]); }
 
 /// Best motion of points `b` onto points `a` (Procrustes in the plane).
-RigidMotion procrustes(const std::vector<std::array<Vec2d, 4>>& edges) {
+Motion procrustes(const std::vector<std::array<Vec2d, 4>>& edges) {
   double weight = 0;
   Vec2d centreA(0.0), centreB(0.0);
   for (const auto& e : edges) {
@@ -41,7 +41,7 @@ RigidMotion procrustes(const std::vector<std::array<Vec2d, 4>>& edges) {
     }
   }
   const double size = std::hypot(cosine, sine);
-  RigidMotion motion;
+  Motion motion;
   if (size > 0) {
     motion.cosine = cosine / size;
     motion.sine = sine / size;
@@ -50,7 +50,7 @@ RigidMotion procrustes(const std::vector<std::array<Vec2d, 4>>& edges) {
   return motion;
 }
 
-bool matches(const std::array<Vec2d, 4>& e, const RigidMotion& motion, double slack) {
+bool matches(const std::array<Vec2d, 4>& e, const Motion& motion, double slack) {
   const double limit = std::min(kMatchTexels, kMatchShare * slack * glm::length(e[1] - e[0]) + 1e-6);
   return glm::length(motion.apply(e[2]) - e[0]) <= limit && glm::length(motion.apply(e[3]) - e[1]) <= limit;
 }
@@ -164,6 +164,8 @@ void ChartSheet::insertBorder(Chart& chart, MeshEdge edge) {
   const Vec2d a = uvs_[vertexAt(edge.triangle, edge.k)];
   const Vec2d b = uvs_[vertexAt(edge.triangle, (edge.k + 1) % 3)];
   visitCells(a, b, [&](std::uint64_t key) { chart.border[key].push_back(edge); });
+  const auto& v = mesh_.triangles[edge.triangle];
+  chart.rim.add({a, b, mesh_.points[v[edge.k]], mesh_.points[v[(edge.k + 1) % 3]]});
 }
 
 std::vector<Fit> ChartSheet::fits(const std::vector<MeshEdge>& shared, double slack) const {
@@ -185,7 +187,7 @@ std::vector<Fit> ChartSheet::fits(const std::vector<MeshEdge>& shared, double sl
   std::vector<Fit> found;
   for (const auto& seed : seeds) {
     Fit best;
-    RigidMotion trial = procrustes(seed);
+    Motion trial = procrustes(seed);
     for (int refinement = 0; refinement < 2; ++refinement) {
       std::vector<std::array<Vec2d, 4>> good;
       Fit fit{trial, {}, 0};
@@ -207,6 +209,22 @@ std::vector<Fit> ChartSheet::fits(const std::vector<MeshEdge>& shared, double sl
   return found;
 }
 
+std::vector<Fit> ChartSheet::hangings(const std::vector<MeshEdge>& shared, double scale) const {
+  std::vector<Fit> found;
+  for (const MeshEdge edge : shared) {
+    const MeshEdge from = beyond(edge);
+    const std::array<Vec2d, 4> ends = {uvs_[vertexAt(edge.triangle, edge.k)], uvs_[vertexAt(edge.triangle, (edge.k + 1) % 3)],
+                                       uvs_[vertexAt(from.triangle, (from.k + 1) % 3)], uvs_[vertexAt(from.triangle, from.k)]};
+    Fit fit{procrustes({ends}), {edge}, glm::length(ends[1] - ends[0]), scale < 1};
+    fit.motion.cosine *= scale;
+    fit.motion.sine *= scale;
+    fit.motion.shift = Vec2d(0.0);
+    fit.motion.shift = 0.5 * (ends[0] + ends[1]) - fit.motion.apply(0.5 * (ends[2] + ends[3]));
+    found.push_back(std::move(fit));
+  }
+  return found;
+}
+
 bool ChartSheet::staysGood(std::uint32_t triangle, const std::array<Vec2d, 3>& uv, double maxStretch) const {
   const auto& v = mesh_.triangles[triangle];
   // A sliver may lie turned over by less than a float UV can tell, but no further.
@@ -221,9 +239,8 @@ Vec2d ChartSheet::placeOf(std::uint32_t triangle, std::uint32_t k, const Welded&
   return place != welded.places.end() ? place->second : welded.motion.apply(uvs_[vertex]);
 }
 
-bool ChartSheet::closesBreak(std::uint32_t into, std::uint32_t from, const Welded& welded) const {
+bool ChartSheet::closesBreak(std::uint32_t into, std::uint32_t from, const Welded& welded, double frameGap) const {
   const bool fewer = charts_[from].breaks.size() < charts_[into].breaks.size();
-  const double gap = frameGap(charts_[into].normals.area + charts_[from].normals.area);
   for (const FrameBreak& edge : charts_[fewer ? from : into].breaks) {
     const std::uint32_t a = chartOf(edge.cornerA / 3);
     const std::uint32_t b = chartOf(edge.cornerB / 3);
@@ -232,12 +249,26 @@ bool ChartSheet::closesBreak(std::uint32_t into, std::uint32_t from, const Welde
     const std::uint32_t moved = a == into ? edge.cornerB : edge.cornerA;
     const Vec2d start = uvs_[vertexAt(still / 3, still % 3)] - placeOf(moved / 3, moved % 3 + 1, welded);
     const Vec2d end = uvs_[vertexAt(still / 3, (still + 1) % 3)] - placeOf(moved / 3, moved % 3, welded);
-    if (glm::length(start) < gap && glm::length(end) < gap) return true;
+    if (glm::length(start) < frameGap && glm::length(end) < frameGap) return true;
   }
   return false;
 }
 
-bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit, const MergeOptions& options) const {
+/// Whether a triangle with an edge on the border, moved to `uv`, overlaps one of the target's that has such an edge.
+bool ChartSheet::liesOn(const Chart& target, std::uint32_t k, const std::array<Vec2d, 3>& uv) const {
+  bool hit = false;
+  visitCells(uv[k], uv[(k + 1) % 3], [&](std::uint64_t key) {
+    const auto cell = target.border.find(key);
+    if (cell == target.border.end() || hit) return;
+    for (const MeshEdge edge : cell->second) {
+      const std::array<Vec2d, 3> other = corners(edge.triangle);
+      if (doubleArea(other) > 0 && doubleArea(uv) > 0 && trianglesOverlap(uv, other, kOverlapTexels)) hit = true;
+    }
+  });
+  return hit;
+}
+
+bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit, double frameGap, const MergeOptions& options) const {
   const Chart& target = charts_[into];
   const Chart& moved = charts_[from];
   Welded welded{fit.motion, {}};
@@ -246,34 +277,29 @@ bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit,
     welded.places[vertexAt(other.triangle, other.k)] = uvs_[vertexAt(edge.triangle, (edge.k + 1) % 3)];
     welded.places[vertexAt(other.triangle, (other.k + 1) % 3)] = uvs_[vertexAt(edge.triangle, edge.k)];
   }
-  if (closesBreak(into, from, welded)) return false;
+  if (closesBreak(into, from, welded, frameGap)) return false;
   Vec2d low = target.low, high = target.high;
   const double maxStretch = options.maxStretch * std::sqrt(smallChartSlack(moved.normals.area));
+  std::vector<ChartRim::Edge> rim;
   for (const std::uint32_t t : moved.triangles) {
     std::array<Vec2d, 3> uv;
-    bool touched = false;
+    bool changed = fit.squeezed;
     for (std::uint32_t k = 0; k < 3; ++k) {
-      touched = touched || welded.places.contains(vertexAt(t, k));
+      changed = changed || welded.places.contains(vertexAt(t, k));
       uv[k] = placeOf(t, k, welded);
       low = glm::min(low, uv[k]);
       high = glm::max(high, uv[k]);
     }
-    if (touched && !staysGood(t, uv, maxStretch)) return false;
+    if (changed && !staysGood(t, uv, maxStretch)) return false;
     for (std::uint32_t k = 0; k < 3; ++k) {
       if (joined_[localTriangle_[t]][k]) continue;
-      bool hit = false;
-      visitCells(uv[k], uv[(k + 1) % 3], [&](std::uint64_t key) {
-        const auto cell = target.border.find(key);
-        if (cell == target.border.end() || hit) return;
-        for (const MeshEdge edge : cell->second) {
-          const std::array<Vec2d, 3> other = corners(edge.triangle);
-          if (doubleArea(other) > 0 && doubleArea(uv) > 0 && trianglesOverlap(uv, other, kOverlapTexels)) hit = true;
-        }
-      });
-      if (hit) return false;
+      if (liesOn(target, k, uv)) return false;
+      const auto& v = mesh_.triangles[t];
+      rim.push_back({uv[k], uv[(k + 1) % 3], mesh_.points[v[k]], mesh_.points[v[(k + 1) % 3]]});
     }
   }
-  return packsWell(high - low, target.normals.area + moved.normals.area, options.largestSide);
+  if (!packsWell(high - low, target.normals.area + moved.normals.area, options.largestSide)) return false;
+  return std::none_of(rim.begin(), rim.end(), [&target](const ChartRim::Edge& edge) { return target.rim.mixesWith(edge); });
 }
 
 /// To be called while the triangles of both charts still answer to their own.
@@ -344,9 +370,9 @@ ChartMesh ChartSheet::together(std::uint32_t a, std::uint32_t b, const std::vect
   return mesh;
 }
 
-bool ChartSheet::closesBreak(std::uint32_t a, std::uint32_t b, const FlatChart& flat) const {
+bool ChartSheet::closesBreak(std::uint32_t a, std::uint32_t b, const FlatChart& flat, double frameGap) const {
   const std::vector<FrameBreak>& breaks = charts_[charts_[a].breaks.size() < charts_[b].breaks.size() ? a : b].breaks;
-  return std::any_of(breaks.begin(), breaks.end(), [&flat](const FrameBreak& edge) { return isClosed(flat, edge); });
+  return std::any_of(breaks.begin(), breaks.end(), [&](const FrameBreak& edge) { return isClosed(flat, edge, frameGap); });
 }
 
 void ChartSheet::replace(std::uint32_t into, std::uint32_t from, const FlatChart& flat) {

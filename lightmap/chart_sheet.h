@@ -5,11 +5,12 @@
 
 #include "lightmap/chart_growing.h"
 #include "lightmap/chart_merging.h"
+#include "lightmap/chart_rim.h"
 
 namespace lumel {
 
-/// Rotation and shift of the plane.
-struct RigidMotion {
+/// Rotation and shift of the plane; with a scale where a small chart is squeezed (cosine^2 + sine^2 < 1).
+struct Motion {
   double cosine = 1, sine = 0;
   Vec2d shift{0.0};
 
@@ -24,9 +25,10 @@ struct MeshEdge {
 
 /// A way to lay one chart against another: the motion, and the shared edges that then meet.
 struct Fit {
-  RigidMotion motion;
+  Motion motion;
   std::vector<MeshEdge> matched;
   double length = 0;  // texels of `matched`
+  bool squeezed = false;
 };
 
 class ChartSheet {
@@ -39,6 +41,7 @@ class ChartSheet {
     Vec2d low{0.0}, high{0.0};
     std::vector<FrameBreak> breaks;        // of the mesh, with a side in this chart and the other in another
     std::unordered_map<std::uint64_t, std::vector<MeshEdge>> border;  // by cell; looked up only
+    ChartRim rim;
   };
 
   /// `breaks`: those of the mesh's whose both sides are in the sheet.
@@ -53,9 +56,13 @@ class ChartSheet {
   /// fit to all of them and to single ones, the longest match first. `slack` multiplies the tolerance.
   std::vector<Fit> fits(const std::vector<MeshEdge>& shared, double slack) const;
 
-  /// Whether `from`, moved and welded at the matched edges, keeps within the limits, lies on nothing of `into` and
-  /// closes no break of the material's frame.
-  bool mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit, const MergeOptions& options) const;
+  /// For a chart that is too small to be alone: how it may hang on by each of the shared edges, squeezed towards it to
+  /// the given scale.
+  std::vector<Fit> hangings(const std::vector<MeshEdge>& shared, double scale) const;
+
+  /// Whether `from`, moved and welded at the matched edges, keeps within the limits, lies on nothing of `into`, comes
+  /// near to nothing of it that is far on the surface, and leaves `frameGap` texels at breaks of the material's frame.
+  bool mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit, double frameGap, const MergeOptions& options) const;
 
   void join(std::uint32_t into, std::uint32_t from, const Fit& fit);
 
@@ -63,7 +70,7 @@ class ChartSheet {
   ChartMesh together(std::uint32_t a, std::uint32_t b, const std::vector<MeshEdge>& shared) const;
 
   /// Whether a new flattening of both charts lays the sides of a break of the frame against each other.
-  bool closesBreak(std::uint32_t a, std::uint32_t b, const FlatChart& flat) const;
+  bool closesBreak(std::uint32_t a, std::uint32_t b, const FlatChart& flat, double frameGap) const;
 
   /// Replaces the two charts by `into` with a new flattening of both.
   void replace(std::uint32_t into, std::uint32_t from, const FlatChart& flat);
@@ -76,7 +83,7 @@ class ChartSheet {
  private:
   /// A chart as it would lie: moved, with some of its vertices welded.
   struct Welded {
-    const RigidMotion& motion;
+    const Motion& motion;
     std::unordered_map<std::uint32_t, Vec2d> places;  // by vertex; looked up only
   };
 
@@ -87,7 +94,8 @@ class ChartSheet {
   void visitCells(Vec2d a, Vec2d b, Visit visit) const;
   void addTriangles(std::uint32_t index, const FlatChart& flat);
   void insertBorder(Chart& chart, MeshEdge edge);
-  bool closesBreak(std::uint32_t into, std::uint32_t from, const Welded& welded) const;
+  bool closesBreak(std::uint32_t into, std::uint32_t from, const Welded& welded, double frameGap) const;
+  bool liesOn(const Chart& target, std::uint32_t k, const std::array<Vec2d, 3>& uv) const;
   void joinBreaks(std::uint32_t into, std::uint32_t from);
   bool staysGood(std::uint32_t triangle, const std::array<Vec2d, 3>& uv, double maxStretch) const;
 

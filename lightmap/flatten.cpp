@@ -1,10 +1,10 @@
 #include "lightmap/flatten.h"
 
-#include <Eigen/Sparse>
-#include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <cmath>
 
-#include "lightmap/nested_dissection.h"
+#include "lightmap/chart_rim.h"
+#include "lightmap/sparse_cholesky.h"
 
 namespace lumel {
 namespace {
@@ -122,12 +122,7 @@ std::vector<Vec2d> unroll(const ChartMesh& chart) {
 /// Local/global iterations: rotations per triangle, then one solve with a matrix that is factored once.
 class RigidRelaxation {
  public:
-  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), row_(chart.points.size()) {
-    const std::vector<std::uint32_t> order = nestedDissection(chart.points, chart.triangles);
-    for (std::uint32_t i = 0; i < order.size(); ++i) row_[order[i]] = i;
-    fixed_ = order.back();
-    solver_.compute(laplacian());
-  }
+  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), solver_(chart.points, chart.triangles) { factorize(); }
 
   /// Iteratively reweighted towards a fourth power of the error: triangles beyond `limit` pull harder, so that the
   /// distortion spreads from where it is worst.
@@ -139,70 +134,27 @@ class RigidRelaxation {
       const double wanted = std::clamp(excess, kLeast, kMost);
       emphasis_[t] = std::sqrt(emphasis_[t] * wanted * wanted);
     }
-    solver_.factorize(laplacian());
+    factorize();
   }
 
-  bool usable() const { return solver_.info() == Eigen::Success; }
+  bool usable() const { return usable_; }
 
   /// One iteration; returns how far points moved, root mean square, or a negative number if the solve failed.
   double step(std::vector<Vec2d>& uvs) const {
-    Eigen::MatrixX2d right = Eigen::MatrixX2d::Zero(static_cast<Eigen::Index>(uvs.size()) - 1, 2);
-    for (std::size_t t = 0; t < chart_.triangles.size(); ++t) addTriangle(t, uvs, right);
-    const Eigen::MatrixX2d solved = solver_.solve(right);
-    if (!solved.allFinite()) return -1;
+    std::vector<Vec2d> move(uvs.size(), Vec2d(0.0));
+    for (std::size_t t = 0; t < chart_.triangles.size(); ++t) addTriangle(t, uvs, move);
+    solver_.solve(move);
     double moved = 0;
-    const Vec2d shift = uvs[fixed_];
     for (std::size_t i = 0; i < uvs.size(); ++i) {
-      const auto row = static_cast<Eigen::Index>(row_[i]);
-      const Vec2d now = i == fixed_ ? Vec2d(0.0) : Vec2d(solved(row, 0), solved(row, 1));
-      const Vec2d delta = now + shift - uvs[i];
-      moved += glm::dot(delta, delta);
-      uvs[i] = now;
+      moved += glm::dot(move[i], move[i]);
+      uvs[i] += move[i];
     }
-    return std::sqrt(moved / static_cast<double>(uvs.size()));
+    return std::isfinite(moved) ? std::sqrt(moved / static_cast<double>(uvs.size())) : -1.0;
   }
 
  private:
-  struct Entry {
-    std::uint32_t column, row;  // row < column: the upper triangle
-    double weight;
-    bool operator<(const Entry& other) const { return column != other.column ? column < other.column : row < other.row; }
-  };
-
-  /// Cotangent Laplacian without the fixed point, upper triangle (what Eigen reads without a copy); assembled in place,
-  /// at 16 bytes per triangle side.
-  Eigen::SparseMatrix<double> laplacian() const {
-    const auto unknowns = static_cast<std::uint32_t>(chart_.points.size() - 1);  // the last point stays at the origin
-    std::vector<double> diagonal(chart_.points.size(), 0.0);
-    std::vector<Entry> entries;
-    entries.reserve(3 * chart_.triangles.size());
-    for (std::size_t t = 0; t < chart_.triangles.size(); ++t) {
-      const std::array<double, 3> weight = cotangents(t, layFlat(chart_, t));
-      for (std::size_t k = 0; k < 3; ++k) {
-        const std::uint32_t i = row_[chart_.triangles[t][k]];
-        const std::uint32_t j = row_[chart_.triangles[t][(k + 1) % 3]];
-        diagonal[i] += weight[k];
-        diagonal[j] += weight[k];
-        if (i < unknowns && j < unknowns) entries.push_back({std::max(i, j), std::min(i, j), weight[k]});
-      }
-    }
-    std::sort(entries.begin(), entries.end());
-    Eigen::SparseMatrix<double> matrix(unknowns, unknowns);
-    matrix.reserve(static_cast<Eigen::Index>(unknowns + entries.size() * 2 / 3));
-    std::size_t next = 0;
-    for (std::uint32_t column = 0; column < unknowns; ++column) {
-      matrix.startVec(column);
-      while (next < entries.size() && entries[next].column == column) {
-        const std::uint32_t row = entries[next].row;
-        double sum = 0;
-        for (; next < entries.size() && entries[next].column == column && entries[next].row == row; ++next)
-          sum += entries[next].weight;
-        matrix.insertBack(row, column) = -sum;
-      }
-      matrix.insertBack(column, column) = diagonal[column];
-    }
-    matrix.finalize();
-    return matrix;
+  void factorize() {
+    usable_ = solver_.factorize([this](std::size_t t) { return cotangents(t, layFlat(chart_, t)); });
   }
 
   /// The larger of the greatest singular value and the inverse of the least; very large where turned over.
@@ -212,16 +164,24 @@ class RigidRelaxation {
     return s.small > 0 ? std::max(s.big, 1 / s.small) : 1e3;
   }
 
-  /// Of the angle opposite each edge (k, k + 1).
+  /// Of the angle opposite each edge (k, k + 1). Slivers, whose shape does not matter, are held less tightly than theirs
+  /// would have it, so that the matrix stays within what floating point can tell apart.
   std::array<double, 3> cotangents(std::size_t t, const FlatTriangle& flat) const {
+    constexpr double kMost = 1e4;
     const std::array<Vec2d, 3> e = edges(flat);
-    const double factor = (emphasis_.empty() ? 1.0 : emphasis_[t]) / (flat.x1 * flat.y2);
     std::array<double, 3> cot;
-    for (std::size_t k = 0; k < 3; ++k) cot[k] = -factor * glm::dot(e[(k + 1) % 3], e[(k + 2) % 3]);
+    double largest = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      cot[k] = -glm::dot(e[(k + 1) % 3], e[(k + 2) % 3]) / (flat.x1 * flat.y2);
+      largest = std::max(largest, std::abs(cot[k]));
+    }
+    const double factor = (emphasis_.empty() ? 1.0 : emphasis_[t]) * std::min(1.0, kMost / largest);
+    for (double& c : cot) c *= factor;
     return cot;
   }
 
-  void addTriangle(std::size_t t, const std::vector<Vec2d>& uvs, Eigen::MatrixX2d& right) const {
+  /// Adds what the triangle misses of its own edges, turned as fits best: the right side for the move that is left.
+  void addTriangle(std::size_t t, const std::vector<Vec2d>& uvs, std::vector<Vec2d>& right) const {
     const FlatTriangle flat = layFlat(chart_, t);
     const std::array<Vec2d, 3> e = edges(flat);
     const std::array<double, 3> weight = cotangents(t, flat);
@@ -240,19 +200,17 @@ class RigidRelaxation {
       cosine = 1;
     }
     for (std::size_t k = 0; k < 3; ++k) {
-      const Vec2d turned = weight[k] * Vec2d(cosine * e[k].x - sine * e[k].y, sine * e[k].x + cosine * e[k].y);
-      const std::uint32_t i = v[k];
-      const std::uint32_t j = v[(k + 1) % 3];
-      if (i != fixed_) right.row(row_[i]) -= Eigen::RowVector2d(turned.x, turned.y);
-      if (j != fixed_) right.row(row_[j]) += Eigen::RowVector2d(turned.x, turned.y);
+      const Vec2d turned(cosine * e[k].x - sine * e[k].y, sine * e[k].x + cosine * e[k].y);
+      const Vec2d missing = weight[k] * (turned - (uvs[v[(k + 1) % 3]] - uvs[v[k]]));
+      right[v[k]] -= missing;
+      right[v[(k + 1) % 3]] += missing;
     }
   }
 
   const ChartMesh& chart_;
-  std::vector<double> emphasis_;    // per triangle: multiplies its cotangents; empty: 1
-  std::vector<std::uint32_t> row_;  // per point: of the matrix
-  std::uint32_t fixed_ = 0;         // the last row's point, at the origin: it is no unknown
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Upper, Eigen::NaturalOrdering<int>> solver_;
+  std::vector<double> emphasis_;  // per triangle: multiplies its cotangents; empty: 1
+  SparseCholesky solver_;
+  bool usable_ = false;
 };
 
 bool isGood(const ChartMesh& chart, std::span<const Vec2d> uvs, const FlattenOptions& options) {
@@ -322,6 +280,7 @@ Flattening flatten(const ChartMesh& chart, const FlattenOptions& options) {
       scaleToSurface(chart, result.uvs);
       good = isGood(chart, result.uvs, options);
     }
+    const bool isFlat = good;
     if (!good) {
       result.uvs = unroll(chart);
       good = isDevelopable(chart, result.uvs, options);
@@ -334,6 +293,7 @@ Flattening flatten(const ChartMesh& chart, const FlattenOptions& options) {
       good = relax(chart, result.uvs, options);
     }
     if (!good || overlapsItself(chart, result.uvs, kOverlapTexels)) return result;
+    if (!isFlat && mixesFarParts(chart, result.uvs)) return result;
   }
   alignToAxes(chart, result.uvs);
   result.valid = packsWell(result.uvs, surfaceArea(chart), options.largestSide);

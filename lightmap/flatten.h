@@ -1,4 +1,4 @@
-// The one door to Eigen: charts laid into the plane.
+// Charts laid into the plane.
 #pragma once
 
 #include "lightmap/chart_mesh.h"

@@ -16,7 +16,7 @@ std::int64_t find(const ChartMesh& chart, std::uint32_t meshTriangle) {
   return place != chart.meshTriangles.end() && *place == meshTriangle ? place - chart.meshTriangles.begin() : -1;
 }
 
-bool findClosed(const FlatChart& chart, const FrameBreak& edge, Slit& slit) {
+bool findClosed(const FlatChart& chart, const FrameBreak& edge, double gap, Slit& slit) {
   const std::int64_t a = find(chart.mesh, edge.cornerA / 3);
   const std::int64_t b = find(chart.mesh, edge.cornerB / 3);
   if (a < 0 || b < 0 || a == b) return false;
@@ -24,7 +24,6 @@ bool findClosed(const FlatChart& chart, const FrameBreak& edge, Slit& slit) {
   const auto uv = [&chart](std::uint32_t triangle, std::uint32_t k) { return chart.uvs[chart.mesh.triangles[triangle][k % 3]]; };
   const Vec2d start = uv(slit.a, edge.cornerA % 3) - uv(slit.b, edge.cornerB % 3 + 1);
   const Vec2d end = uv(slit.a, edge.cornerA % 3 + 1) - uv(slit.b, edge.cornerB % 3);
-  const double gap = frameGap(surfaceArea(chart.mesh));
   return glm::length(start) < gap && glm::length(end) < gap;
 }
 
@@ -74,19 +73,21 @@ FlatChart part(const FlatChart& whole, const std::vector<bool>& keep, bool which
 
 }  // namespace
 
-bool isClosed(const FlatChart& chart, const FrameBreak& edge) {
+bool isClosed(const FlatChart& chart, const FrameBreak& edge, double gap) {
   Slit unused;
-  return findClosed(chart, edge, unused);
+  return findClosed(chart, edge, gap, unused);
 }
 
-std::vector<FlatChart> splitAtFrameSlits(const HalfEdgeMesh& mesh, std::vector<FlatChart> charts) {
+std::vector<FlatChart> splitAtFrameSlits(const HalfEdgeMesh& mesh, std::vector<FlatChart> charts, double smallGap) {
   std::vector<std::uint32_t> chartOf(mesh.size(), 0);
   for (std::uint32_t c = 0; c < charts.size(); ++c)
     for (const std::uint32_t t : charts[c].mesh.meshTriangles) chartOf[t] = c;
   for (const FrameBreak& edge : mesh.frameBreaks) {
     const std::uint32_t c = chartOf[edge.cornerA / 3];
     Slit slit;
-    if (c != chartOf[edge.cornerB / 3] || !findClosed(charts[c], edge, slit)) continue;
+    if (c != chartOf[edge.cornerB / 3]) continue;
+    const double gap = surfaceArea(charts[c].mesh) < kTinyTexels ? smallGap : kFrameGap;
+    if (!findClosed(charts[c], edge, gap, slit)) continue;
     const std::vector<std::uint32_t> fromA = stepsFrom(charts[c].mesh, slit.a);
     const std::vector<std::uint32_t> fromB = stepsFrom(charts[c].mesh, slit.b);
     std::vector<bool> nearA(fromA.size());

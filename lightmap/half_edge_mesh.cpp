@@ -150,7 +150,7 @@ class Builder {
       std::uint32_t forward, backward;
     };
     std::vector<Pair> pairs;
-    constexpr std::size_t kMostSides = 64;  // a fan of more sheets is left as separate sheets: n^2 pairs
+    constexpr std::size_t kMostSides = 256;  // a fan of more sheets is left as separate sheets: n^2 pairs
     if (count > kMostSides) return;
     for (std::size_t i = 0; i < count; ++i)
       for (std::size_t j = 0; j < count; ++j) {
@@ -187,7 +187,8 @@ class Builder {
     [[maybe_unused]] static const bool quiet = (omerr().disable(), true);
     OpenMeshMesh mesh;
     const std::size_t count = mesh_.sourceTriangle.size();
-    mesh.reserve(count / 2 + 3, 3 * count / 2 + 3, count);
+    const auto borders = static_cast<std::size_t>(std::count(opposite_.begin(), opposite_.end(), -1));
+    mesh.reserve(count / 2 + borders + 3, (3 * count + borders) / 2 + 3, count);
     std::vector<int> vertexOfFan(fan_.size(), -1);
     mesh_.triangles.resize(count);
     for (std::uint32_t corner = 0; corner < fan_.size(); ++corner) {

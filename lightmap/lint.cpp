@@ -5,15 +5,19 @@
 #include <bit>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "lightmap/raster.h"
+#include "lightmap/texels.h"
 #include "lightmap/uv_points.h"
+#include "scene/parallel.h"
 
 namespace lumel {
 namespace {
 
 constexpr float kFrameCos = 0.9962f;         // 5 degrees
 constexpr double kDensityTolerance = 0.25;
+constexpr double kFarTexels = 4.0;           // a slit of less blurs a detail that a lightmap does not hold
 constexpr double kFloatUvStep = 6e-8;        // of the page's side
 constexpr double kBytesPerTexel = 4 * 3 * 2.0;  // four maps of three half floats
 
@@ -58,6 +62,7 @@ class Linter {
     for (std::size_t page = 0; page < atlas_.pages.size(); ++page) measurePage(static_cast<int>(page));
     findFrameCrossings();
     addChartFindings();
+    findMixedTexels();
     report_.mapBytes = report_.pageTexels * kBytesPerTexel;
     return std::move(report_);
   }
@@ -183,14 +188,10 @@ class Linter {
       }
   }
 
-  struct FrameVertex {
-    std::array<std::uint32_t, 6> key;  // chart, position, uv
-    Vec4 tangent;
-    Vec3 normal;
-  };
-
-  void findFrameCrossings() {
-    std::vector<FrameVertex> vertices;
+  /// Numbers for the vertices of all surfaces, in their order: equal where chart, position and UV are.
+  std::vector<std::uint32_t> pointNumbers() const {
+    using Key = std::array<std::uint32_t, 6>;
+    std::vector<std::pair<Key, std::uint32_t>> vertices;
     for (const Surface& surface : atlas_.surfaces) {
       std::vector<std::uint32_t> chartOf(surface.positions.size(), 0);
       for (std::size_t i = 0; i < surface.indices.size(); ++i) chartOf[surface.indices[i]] = surface.charts[i / 3];
@@ -199,17 +200,91 @@ class Linter {
         const Vec2 uv = surface.lightmapUvs[i] + 0.0f;
         vertices.push_back({{chartOf[i], std::bit_cast<std::uint32_t>(p.x), std::bit_cast<std::uint32_t>(p.y), std::bit_cast<std::uint32_t>(p.z),
                              std::bit_cast<std::uint32_t>(uv.x), std::bit_cast<std::uint32_t>(uv.y)},
-                            surface.tangents[i],
-                            surface.normals[i]});
+                            static_cast<std::uint32_t>(vertices.size())});
       }
     }
-    std::stable_sort(vertices.begin(), vertices.end(), [](const FrameVertex& a, const FrameVertex& b) { return a.key < b.key; });
-    for (std::size_t i = 1; i < vertices.size(); ++i) {
-      const FrameVertex& a = vertices[i - 1];
-      const FrameVertex& b = vertices[i];
-      if (a.key == b.key && (a.tangent.w != b.tangent.w || glm::dot(Vec3(a.tangent), Vec3(b.tangent)) < kFrameCos))
-        charts_[a.key[0]].crossesFrame = true;
+    std::sort(vertices.begin(), vertices.end());
+    std::vector<std::uint32_t> numbers(vertices.size(), 0);
+    for (std::size_t i = 1; i < vertices.size(); ++i)
+      numbers[vertices[i].second] = numbers[vertices[i - 1].second] + (vertices[i].first != vertices[i - 1].first ? 1 : 0);
+    return numbers;
+  }
+
+  /// Of edges that a chart runs across: small turns may add up around a point without any edge that breaks.
+  void findFrameCrossings() {
+    struct Side {
+      std::uint32_t low, high;              // points
+      std::uint32_t chart, surface, atLow, atHigh;  // vertices of the surface
+    };
+    const std::vector<std::uint32_t> numbers = pointNumbers();
+    std::vector<Side> sides;
+    std::size_t base = 0;
+    for (std::uint32_t s = 0; s < atlas_.surfaces.size(); ++s) {
+      const Surface& surface = atlas_.surfaces[s];
+      for (std::size_t i = 0; i < surface.indices.size(); ++i) {
+        std::uint32_t a = surface.indices[i];
+        std::uint32_t b = surface.indices[i % 3 == 2 ? i - 2 : i + 1];
+        if (numbers[base + a] > numbers[base + b]) std::swap(a, b);
+        sides.push_back({numbers[base + a], numbers[base + b], surface.charts[i / 3], s, a, b});
+      }
+      base += surface.positions.size();
     }
+    std::stable_sort(sides.begin(), sides.end(),
+                     [](const Side& a, const Side& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
+    for (std::size_t i = 1; i < sides.size(); ++i) {
+      const Side& a = sides[i - 1];
+      const Side& b = sides[i];
+      if (a.low != b.low || a.high != b.high) continue;
+      const Surface& of = atlas_.surfaces[a.surface];
+      const Surface& other = atlas_.surfaces[b.surface];
+      const auto breaks = [&](std::uint32_t v, std::uint32_t w) {
+        const Vec4 t = of.tangents[v];
+        const Vec4 u = other.tangents[w];
+        return t.w != u.w || glm::dot(Vec3(t), Vec3(u)) < kFrameCos;
+      };
+      if (!breaks(a.atLow, b.atLow) && !breaks(a.atHigh, b.atHigh)) continue;
+      charts_[a.chart].crossesFrame = true;
+    }
+  }
+
+  /// Texels whose parts are of one chart but far apart on the surface.
+  void findMixedTexels() {
+    LintFinding mixed{"self-mixing", "texels that mix places of a chart more than four texels apart on the surface", LintLevel::Warning, 0, report_.coveredTexels, "texels", {}, -1, 0, 0, 0};
+    const std::vector<PageTexels> pages = findTexels(atlas_);
+    for (const PageTexels& page : pages) {
+      std::vector<double> apart(page.size(), 0.0);  // texels
+      constexpr std::size_t kGrain = 1024;
+      parallelFor(page.size(), kGrain, [&](std::size_t first, std::size_t last) {
+        TexelFootprint footprint;
+        for (std::size_t i = first; i < last; ++i)
+          if (page.trianglesOf(i).size() > 1) apart[i] = extentOnSurface(page, i, footprint);
+      });
+      for (std::size_t i = 0; i < page.size(); ++i) {
+        if (!(apart[i] > kFarTexels)) continue;
+        ++mixed.count;
+        setWorst(mixed, apart[i], static_cast<int>(page.trianglesOf(i)[0].surface), Vec2d(page.coords[i].x, page.coords[i].y));
+      }
+    }
+    report_.findings.push_back(mixed);
+  }
+
+  /// Diagonal of the box around the middles of a texel's pieces, as far as they are of its first triangle's chart.
+  double extentOnSurface(const PageTexels& page, std::size_t texel, TexelFootprint& footprint) const {
+    footprint.clip(atlas_, page, texel);
+    const auto chartOf = [this](const TriangleRef& t) { return atlas_.surfaces[t.surface].charts[t.triangle]; };
+    const std::uint32_t chart = chartOf(page.trianglesOf(texel)[0]);
+    Vec3d low(std::numeric_limits<double>::infinity()), high = -low;
+    for (const TexelFootprint::Piece& piece : footprint.pieces()) {
+      const TexelFootprint::Source& source = footprint.sources()[piece.source];
+      if (chartOf(source.triangle) != chart) continue;
+      const std::vector<Vec3>& p = atlas_.surfaces[source.triangle.surface].positions;
+      const Vec2d w = Vec2d(piece.barycentric[0] + piece.barycentric[1] + piece.barycentric[2]) / 3.0;
+      const Vec3d middle = (1 - w.x - w.y) * Vec3d(p[source.vertices[0]]) + w.x * Vec3d(p[source.vertices[1]]) + w.y * Vec3d(p[source.vertices[2]]);
+      low = glm::min(low, middle);
+      high = glm::max(high, middle);
+    }
+    const ChartFigures& figures = charts_[chart];
+    return low.x <= high.x && figures.surface > 0 ? glm::length(high - low) * std::sqrt(figures.texels / figures.surface) : 0.0;
   }
 
   template <class Test, class Value>

@@ -38,8 +38,9 @@ struct LintReport {
 /// Kinds: overlap (texels where a chart lies on another or on itself, at 16 points per texel), out-of-range (vertices
 /// off the page), flip (triangles turned over within their chart), mirrored (charts), lost (triangles with a surface
 /// but no texels), sub-texel (charts below one texel's area), tiny (below four), density (charts more than a quarter
-/// off the mean density of their kind), frame-crossing (charts across which the bake frame breaks), gap (charts that
-/// another comes nearer to than `padding`).
+/// off the mean density of their kind), frame-crossing (charts with an edge inside at which the bake frame breaks), gap
+/// (charts that another comes nearer to than `padding`), self-mixing (texels that hold places of one chart that are more
+/// than four texels apart on the surface, as at a strip that was laid back along a wall).
 LintReport lintAtlas(const Scene& scene, const Atlas& atlas, int padding);
 
 /// One line per finding that has something to say, and a line of totals.

@@ -7,11 +7,11 @@
 namespace lumel {
 namespace {
 
-constexpr std::size_t kLeafPoints = 3;  // so few fill up in any order
+constexpr std::size_t kLeafPoints = 8;  // so few nearly fill up in any order
 
-class Dissection {
+class Dissector {
  public:
-  Dissection(std::span<const Vec3d> points, std::span<const std::array<std::uint32_t, 3>> triangles)
+  Dissector(std::span<const Vec3d> points, std::span<const std::array<std::uint32_t, 3>> triangles)
       : points_(points), start_(points.size() + 1, 0), half_(points.size(), 0), order_(points.size()) {
     for (const auto& t : triangles)
       for (const std::uint32_t v : t) start_[v + 1] += 2;
@@ -26,9 +26,9 @@ class Dissection {
     std::iota(order_.begin(), order_.end(), 0u);
   }
 
-  std::vector<std::uint32_t> run() {
-    order(order_);
-    return std::move(order_);
+  Dissection run() {
+    if (!order_.empty()) order(0, static_cast<std::uint32_t>(order_.size()));
+    return {std::move(order_), std::move(nodes_)};
   }
 
  private:
@@ -43,8 +43,22 @@ class Dissection {
     return size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   }
 
-  void order(std::span<std::uint32_t> part) {
-    if (part.size() <= kLeafPoints) return;
+  /// Orders a range and returns its node.
+  std::int32_t order(std::uint32_t begin, std::uint32_t end) {
+    const std::span<std::uint32_t> part(order_.data() + begin, end - begin);
+    DissectionNode node{begin, end};
+    if (part.size() > kLeafPoints) {
+      const auto [left, between] = cut(part);
+      node.begin = end - between;
+      node.left = order(begin, begin + left);
+      node.right = order(begin + left, node.begin);
+    }
+    nodes_.push_back(node);
+    return static_cast<std::int32_t>(nodes_.size()) - 1;
+  }
+
+  /// Puts the left half first, then the right one, then what parts them; returns the first and last count.
+  std::pair<std::uint32_t, std::uint32_t> cut(std::span<std::uint32_t> part) {
     const int axis = longestAxis(part);
     const auto middle = part.begin() + static_cast<std::ptrdiff_t>(part.size() / 2);
     std::nth_element(part.begin(), middle, part.end(), [&](std::uint32_t a, std::uint32_t b) {
@@ -57,24 +71,24 @@ class Dissection {
       return std::none_of(neighbours_.begin() + start_[v], neighbours_.begin() + start_[v + 1],
                           [&](std::uint32_t n) { return half_[n] == right; });
     });
-    const auto left = static_cast<std::size_t>(parting - part.begin());
-    const auto between = static_cast<std::size_t>(middle - parting);
+    const auto left = static_cast<std::uint32_t>(parting - part.begin());
+    const auto between = static_cast<std::uint32_t>(middle - parting);
     std::rotate(parting, middle, part.end());
-    order(part.first(left));
-    order(part.subspan(left, part.size() - left - between));
+    return {left, between};
   }
 
   std::span<const Vec3d> points_;
   std::vector<std::uint32_t> start_, neighbours_;
   std::vector<std::uint32_t> half_;
   std::vector<std::uint32_t> order_;
+  std::vector<DissectionNode> nodes_;
   std::uint32_t parts_ = 0;
 };
 
 }  // namespace
 
-std::vector<std::uint32_t> nestedDissection(std::span<const Vec3d> points, std::span<const std::array<std::uint32_t, 3>> triangles) {
-  return Dissection(points, triangles).run();
+Dissection nestedDissection(std::span<const Vec3d> points, std::span<const std::array<std::uint32_t, 3>> triangles) {
+  return Dissector(points, triangles).run();
 }
 
 }  // namespace lumel

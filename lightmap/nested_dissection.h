@@ -11,9 +11,19 @@
 
 namespace lumel {
 
-/// The points in the order in which a factorization should eliminate them: halves first, the points that part them
-/// last, each half likewise. Halves are cut at the median along the longest side of their box, so the parting line of a
-/// surface of n points has about sqrt(n) and a factor n log n entries.
-std::vector<std::uint32_t> nestedDissection(std::span<const Vec3d> points, std::span<const std::array<std::uint32_t, 3>> triangles);
+/// Points that are eliminated together: a few that are left in the end of a cut, or those that part two halves.
+struct DissectionNode {
+  std::uint32_t begin = 0, end = 0;    // into Dissection::order
+  std::int32_t left = -1, right = -1;  // nodes of the two halves; both before this one, with all that is below them
+};
+
+struct Dissection {
+  std::vector<std::uint32_t> order;   // points, as a factorization should eliminate them
+  std::vector<DissectionNode> nodes;  // children before parents, ranges ascending and without gaps
+};
+
+/// Halves first, the points that part them last, each half likewise. Halves are cut at the median along the longest side
+/// of their box, so the parting line of a surface of n points has about sqrt(n) and a factor n log n entries.
+Dissection nestedDissection(std::span<const Vec3d> points, std::span<const std::array<std::uint32_t, 3>> triangles);
 
 }  // namespace lumel

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/lightmap/chart_checks.h"
 
 namespace lumel {
@@ -40,7 +42,7 @@ struct Fixture {
 TEST(Lint, FindsNothingInASoundAtlas) {
   const Fixture f;
   const LintReport report = lintAtlas(f.scene, f.atlas, 2);
-  EXPECT_EQ(report.findings.size(), 10u);
+  EXPECT_EQ(report.findings.size(), 11u);
   for (const LintFinding& finding : report.findings) EXPECT_EQ(finding.count, 0) << finding.id;
   EXPECT_EQ(report.coveredTexels, 128);
   EXPECT_EQ(report.pageTexels, 1024);
@@ -113,6 +115,45 @@ TEST(Lint, SeesFramesThatBreakInsideAChart) {
     }
   }
   EXPECT_EQ(f.find("frame-crossing").count, 1);
+}
+
+TEST(Lint, LetsSmallTurnsAddUpAroundAPoint) {
+  // A fan of six triangles around a point, each with a frame 4 degrees on from its neighbour's: no edge breaks.
+  std::vector<Vec3> points = {{0, 0, 0}};
+  std::vector<std::uint32_t> indices;
+  for (std::uint32_t k = 0; k < 6; ++k) {
+    points.push_back(Vec3(std::cos(0.9f * static_cast<float>(k)), std::sin(0.9f * static_cast<float>(k)), 0));
+    if (k > 0) indices.insert(indices.end(), {0, k, k + 1});
+  }
+  const Scene scene = sceneOf(points, indices);  // with vertices of its own for each triangle
+  for (const float step : {4.0f, 6.0f}) {
+    Atlas atlas = chartsOf(scene, 8, 32).atlas;
+    ASSERT_EQ(atlas.charts.size(), 1u);
+    Surface& s = atlas.surfaces.at(0);
+    for (std::size_t t = 0; t < s.triangleCount(); ++t)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const float turn = glm::radians(step * static_cast<float>(s.sourceTriangle[t]));
+        s.tangents[s.indices[3 * t + k]] = Vec4(std::cos(turn), std::sin(turn), 0, 1);
+      }
+    for (const LintFinding& f : lintAtlas(scene, atlas, 2).findings) {
+      if (f.id != "frame-crossing") continue;
+      EXPECT_EQ(f.count, step > 5 ? 1 : 0);
+    }
+  }
+}
+
+TEST(Lint, SeesTexelsThatMixFarPartsOfAChart) {
+  Fixture f;
+  // The second square is now of the first one's chart, half a texel beside it, and 2 units of 8 texels away.
+  f.place(1, {9.5f, 1}, 8);
+  EXPECT_EQ(f.find("self-mixing").count, 0);  // of two charts: that is a gap
+  for (std::uint32_t& chart : f.atlas.surfaces[0].charts) chart = 0;
+  EXPECT_EQ(f.find("self-mixing").count, 0);  // texels 9 and 10 hold one part each
+  f.place(1, {8.5f, 1}, 8);
+  const LintFinding mixed = f.find("self-mixing");
+  EXPECT_EQ(mixed.count, 8);
+  EXPECT_EQ(mixed.x, 8);
+  EXPECT_EQ(mixed.level, LintLevel::Warning);
 }
 
 TEST(ChartPicture, ShowsEachChartInItsColour) {

@@ -49,7 +49,7 @@ std::size_t fillOf(const Grid& grid, const std::vector<std::uint32_t>& order) {
 
 TEST(NestedDissection, IsAnOrderOfAllPointsWithFarLessFillThanTheirOwn) {
   const Grid grid(48);
-  const std::vector<std::uint32_t> order = nestedDissection(grid.points, grid.triangles);
+  const std::vector<std::uint32_t> order = nestedDissection(grid.points, grid.triangles).order;
   std::vector<std::uint32_t> own(grid.points.size());
   for (std::uint32_t i = 0; i < own.size(); ++i) own[i] = i;
   std::vector<std::uint32_t> sorted = order;
@@ -63,11 +63,11 @@ TEST(NestedDissection, IsAnOrderOfAllPointsWithFarLessFillThanTheirOwn) {
 TEST(NestedDissection, OfPointsInOnePlaceOrNoneEnds) {
   const Grid grid(8);
   const std::vector<Vec3d> same(grid.points.size(), Vec3d(1, 2, 3));
-  std::vector<std::uint32_t> order = nestedDissection(same, grid.triangles);
+  std::vector<std::uint32_t> order = nestedDissection(same, grid.triangles).order;
   std::sort(order.begin(), order.end());
   EXPECT_EQ(order.back() + 1, same.size());
-  EXPECT_EQ(nestedDissection(std::vector<Vec3d>(1), {}), std::vector<std::uint32_t>{0});
-  EXPECT_TRUE(nestedDissection({}, {}).empty());
+  EXPECT_EQ(nestedDissection(std::vector<Vec3d>(1), {}).order, std::vector<std::uint32_t>{0});
+  EXPECT_TRUE(nestedDissection({}, {}).nodes.empty());
 }
 
 }  // namespace

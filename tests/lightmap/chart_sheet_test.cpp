@@ -1,0 +1,109 @@
+// What may join a chart: squeezed small charts, and parts that would share texels with far ones.
+#include "lightmap/chart_sheet.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+namespace lumel {
+namespace {
+
+/// A mesh of points in texels, joined at edges with equal point numbers.
+HalfEdgeMesh meshOf(std::vector<Vec3d> points, std::vector<std::array<std::uint32_t, 3>> triangles) {
+  HalfEdgeMesh mesh;
+  mesh.points = std::move(points);
+  mesh.triangles = std::move(triangles);
+  mesh.neighbours.assign(mesh.size(), {-1, -1, -1});
+  mesh.hard.assign(mesh.size(), {false, false, false});
+  for (std::uint32_t t = 0; t < mesh.size(); ++t)
+    for (std::uint32_t u = 0; u < mesh.size(); ++u)
+      for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 3; ++j)
+          if (mesh.triangles[t][i] == mesh.triangles[u][(j + 1) % 3] && mesh.triangles[t][(i + 1) % 3] == mesh.triangles[u][j])
+            mesh.neighbours[t][i] = static_cast<std::int32_t>(u);
+  return mesh;
+}
+
+/// The triangles as one chart, each point where the mesh has it but for its z.
+FlatChart flatChart(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> triangles) {
+  FlatChart flat;
+  flat.mesh = makeChartMesh(mesh, std::move(triangles));
+  for (const Vec3d& p : flat.mesh.points) flat.uvs.push_back(Vec2d(p));
+  return flat;
+}
+
+struct TwoCharts {
+  HalfEdgeMesh mesh;
+  FlatChart big, small;
+  std::vector<std::uint32_t> localTriangle;
+  std::vector<MeshEdge> shared;  // from the big chart's side
+
+  TwoCharts(HalfEdgeMesh whole, std::vector<std::uint32_t> bigTriangles, std::vector<std::uint32_t> smallTriangles)
+      : mesh(std::move(whole)), big(flatChart(mesh, bigTriangles)), small(flatChart(mesh, smallTriangles)), localTriangle(mesh.size()) {
+    std::iota(localTriangle.begin(), localTriangle.end(), 0u);
+    for (const std::uint32_t t : bigTriangles)
+      for (std::uint32_t k = 0; k < 3; ++k)
+        if (std::count(smallTriangles.begin(), smallTriangles.end(), static_cast<std::uint32_t>(mesh.neighbours[t][k])) > 0)
+          shared.push_back({t, k});
+  }
+
+  ChartSheet sheet() { return ChartSheet(mesh, {&big, &small}, localTriangle, {}); }
+};
+
+TEST(ChartSheet, ASmallChartIsSqueezedIntoANotchThatItDoesNotFit) {
+  // A slot of one texel's width in a block, and on its left side a triangle that is 1.9 texels high.
+  TwoCharts c(meshOf({{0, 0, 0}, {0, 4, 0}, {-4, 4, 0}, {-4, 0, 0}, {0, -4, 0}, {-4, -4, 0}, {0, 2, 1.9},
+                      {1, 0, 0}, {5, -4, 0}, {5, 4, 0}, {1, 4, 0}},
+                     {{0, 1, 2}, {0, 2, 3}, {0, 3, 5}, {0, 5, 4}, {0, 4, 7}, {7, 4, 8}, {7, 8, 9}, {7, 9, 10}, {1, 0, 6}}),
+              {0, 1, 2, 3, 4, 5, 6, 7}, {8});
+  c.small.uvs = {{0, 4}, {0, 0}, {1.9, 2}};
+  ASSERT_EQ(c.shared.size(), 1u);
+  const ChartSheet sheet = c.sheet();
+  const MergeOptions options;
+  EXPECT_FALSE(sheet.mayJoin(0, 1, sheet.hangings(c.shared, 1.0).at(0), 1.0, options));
+  EXPECT_FALSE(sheet.mayJoin(0, 1, sheet.hangings(c.shared, 0.7).at(0), 1.0, options));
+  const Fit fit = sheet.hangings(c.shared, 0.5).at(0);
+  EXPECT_TRUE(sheet.mayJoin(0, 1, fit, 1.0, options));
+  ChartSheet joined = c.sheet();
+  joined.join(0, 1, fit);
+  EXPECT_FALSE(overlapsItself(joined.take(0).mesh, joined.take(0).uvs, 1e-3));
+}
+
+TEST(ChartSheet, AStripThatWouldLieBesideAFarPartStaysApart) {
+  // A wall of 20 x 4 with a post at its end, and a strip that stands up on the post's side; laid flat it runs back along
+  // the wall, `gap` texels away.
+  for (const double gap : {0.5, 3.0}) {
+    TwoCharts c(meshOf({{0, 0, 0}, {20, 0, 0}, {20, 4, 0}, {0, 4, 0}, {24, 0, 0}, {24, 5 + gap, 0}, {20, 4 + gap, 0}, {20, 5 + gap, 0},
+                        {20, 4 + gap, 20}, {20, 5 + gap, 20}},
+                       {{0, 1, 2}, {0, 2, 3}, {1, 4, 2}, {4, 5, 2}, {2, 5, 6}, {6, 5, 7}, {6, 7, 9}, {6, 9, 8}}),
+                {0, 1, 2, 3, 4, 5}, {6, 7});
+    for (std::size_t i = 0; i < c.small.uvs.size(); ++i) c.small.uvs[i].x = 20 - c.small.mesh.points[i].z;
+    ASSERT_EQ(c.shared.size(), 1u);
+    const ChartSheet sheet = c.sheet();
+    EXPECT_EQ(sheet.mayJoin(0, 1, sheet.hangings(c.shared, 1.0).at(0), 1.0, MergeOptions()), gap > 2);
+  }
+}
+
+TEST(ChartRim, SeesLegsThatAreNearOnThePageAloneAndNotSlitsOfTheSurface) {
+  // Two legs of a U, 20 texels long, `near` apart on the page and `far` apart on the surface.
+  const auto mixes = [](double near, double far) {
+    ChartRim rim;
+    rim.add({{0, 0}, {20, 0}, {0, 0, 0}, {20, 0, 0}});
+    return rim.mixesWith({{20, near}, {0, near}, {20, far, 0}, {0, far, 0}});
+  };
+  EXPECT_TRUE(mixes(0.5, 10));
+  EXPECT_TRUE(mixes(1.0, 10));
+  EXPECT_FALSE(mixes(0.5, 0.5));  // a slit of the surface itself
+  EXPECT_FALSE(mixes(2.5, 10));
+}
+
+TEST(ChartRim, SeesAVThatOpensOnTheSurfaceOnly) {
+  ChartRim rim;
+  rim.add({{0, 0}, {30, 0}, {0, 0, 0}, {30, 0, 0}});
+  // 1 texel of opening at the end of 30 on the page, but 30 on the surface.
+  EXPECT_TRUE(rim.mixesWith({{0, 0}, {30, 1}, {0, 0, 0}, {0, 30, 0}}));
+  EXPECT_FALSE(rim.mixesWith({{0, 0}, {30, 1}, {0, 0, 0}, {30, 1, 0}}));
+}
+
+}  // namespace
+}  // namespace lumel
