@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <queue>
 #include <vector>
 
 namespace lumel {
@@ -157,6 +158,51 @@ class BorderGraph {
   std::vector<Index> table_;
   std::size_t used_ = 0;
   int shift_ = 64;
+};
+
+/// Borders by the cost of merging across them: the cheapest first, then the first. Infinite costs are left out.
+class BorderQueue {
+ public:
+  template <class Cost>
+  void push(std::uint32_t border, Cost cost) {
+    if (const double c = cost(border); std::isfinite(c)) queue_.push({static_cast<float>(c), border});
+  }
+
+  /// All borders of a graph that are not gone.
+  template <class Graph, class Cost>
+  void fill(const Graph& graph, Cost cost) {
+    std::vector<Candidate> all;
+    all.reserve(graph.size());
+    for (std::uint32_t border = 0; border < graph.size(); ++border) {
+      if (!graph.isAlive(border)) continue;
+      if (const double c = cost(border); std::isfinite(c)) all.push_back({static_cast<float>(c), border});
+    }
+    queue_ = std::priority_queue<Candidate>(std::less<Candidate>(), std::move(all));
+  }
+
+  /// Calls merge(border) until the queue is empty. Costs are brought up to date only when they come up: growth of
+  /// a region rarely makes a merge cheaper, and whoever knows that it did pushes the border again.
+  template <class Graph, class Cost, class Merge>
+  void run(const Graph& graph, Cost cost, Merge merge) {
+    while (!queue_.empty()) {
+      const Candidate top = queue_.top();
+      queue_.pop();
+      if (!graph.isAlive(top.border)) continue;
+      const double now = cost(top.border);
+      if (!(now > top.cost * 1.0001 + 1e-9))
+        merge(top.border);
+      else if (std::isfinite(now))
+        queue_.push({static_cast<float>(now), top.border});
+    }
+  }
+
+ private:
+  struct Candidate {
+    float cost;
+    std::uint32_t border;
+    bool operator<(const Candidate& other) const { return cost != other.cost ? cost > other.cost : border > other.border; }
+  };
+  std::priority_queue<Candidate> queue_;
 };
 
 }  // namespace lumel

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <queue>
 
 #include "lightmap/border_graph.h"
 #include "lightmap/chart_mesh.h"
@@ -32,14 +31,6 @@ struct Border {
   }
 };
 
-struct Candidate {
-  float cost;
-  std::uint32_t border;
-  bool operator<(const Candidate& other) const {  // the queue's top is the cheapest, then the first
-    return cost != other.cost ? cost > other.cost : border > other.border;
-  }
-};
-
 /// Smallest eigenvalue of a symmetric 3x3 matrix (xx yy zz xy xz yz), by the trigonometric formula.
 double smallestEigenvalue(const std::array<double, 6>& m) {
   const double mean = (m[0] + m[1] + m[2]) / 3;
@@ -63,18 +54,9 @@ class Grower {
     tree_.merges.reserve(mesh_.size());
     makeRegions();
     makeBorders();
-    while (!queue_.empty()) {
-      const Candidate top = queue_.top();
-      queue_.pop();
-      if (!borders_.isAlive(top.border)) continue;
-      // Costs are brought up to date only when they come up: a region's growth rarely makes a merge cheaper.
-      const double now = cost(top.border);
-      if (now > top.cost * 1.0001 + 1e-9) {
-        if (std::isfinite(now)) queue_.push({static_cast<float>(now), top.border});
-        continue;
-      }
-      merge(top.border);
-    }
+    const auto costOf = [this](std::uint32_t border) { return cost(border); };
+    queue_.fill(borders_, costOf);
+    queue_.run(borders_, costOf, [this](std::uint32_t border) { merge(border); });
     collectRoots();
     return std::move(tree_);
   }
@@ -119,11 +101,6 @@ class Grower {
         border.absorb({static_cast<float>(length), static_cast<float>(length * weight * std::max(0.0, bend))});
       }
     }
-    std::vector<Candidate> first;
-    first.reserve(borders_.size());
-    for (std::uint32_t i = 0; i < borders_.size(); ++i)
-      if (const double c = cost(i); std::isfinite(c)) first.push_back({static_cast<float>(c), i});
-    queue_ = std::priority_queue<Candidate>(std::less<Candidate>(), std::move(first));
   }
 
   /// Infinite where the merge is out of the question.
@@ -159,7 +136,7 @@ class Grower {
     into.node = static_cast<std::uint32_t>(tree_.triangleCount + tree_.merges.size() - 1);
     borders_.merge(drop, keep, [this](std::uint32_t grown) {
       // The longer common border may be a better reason to merge than either part was.
-      if (const double c = cost(grown); std::isfinite(c)) queue_.push({static_cast<float>(c), grown});
+      queue_.push(grown, [this](std::uint32_t b) { return cost(b); });
     });
   }
 
@@ -182,7 +159,7 @@ class Grower {
   const GrowOptions& options_;
   std::vector<Region> regions_;
   BorderGraph<Border> borders_;
-  std::priority_queue<Candidate> queue_;
+  BorderQueue queue_;
   MergeTree tree_;
 };
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <queue>
 
 #include "lightmap/border_graph.h"
 #include "lightmap/chart_growing.h"
@@ -29,14 +28,6 @@ struct Border {
     length += other.length;
     crease += other.crease;
     other.edges = {};
-  }
-};
-
-struct Candidate {
-  float cost;
-  std::uint32_t border;
-  bool operator<(const Candidate& other) const {
-    return cost != other.cost ? cost > other.cost : border > other.border;
   }
 };
 
@@ -66,9 +57,9 @@ class PartMerger {
     makeBorders();
     for (const Phase phase : {Phase::All, Phase::Small, Phase::SmallTogether}) {
       phase_ = phase;
-      for (std::uint32_t i = 0; i < borders_.size(); ++i)
-        if (borders_.isAlive(i)) push(i);
-      merge();
+      const auto costOf = [this](std::uint32_t border) { return cost(border); };
+      queue_.fill(borders_, costOf);
+      queue_.run(borders_, costOf, [this](std::uint32_t border) { tryMerge(border); });
     }
     return collect();
   }
@@ -85,20 +76,6 @@ class PartMerger {
     }
   }
 
-  void merge() {
-    while (!queue_.empty()) {
-      const Candidate top = queue_.top();
-      queue_.pop();
-      if (!borders_.isAlive(top.border)) continue;
-      const double now = cost(top.border);
-      if (now > top.cost * 1.0001 + 1e-9) {
-        if (std::isfinite(now)) queue_.push({static_cast<float>(now), top.border});
-        continue;
-      }
-      tryMerge(top.border);
-    }
-  }
-
   void addSide(std::uint32_t c, MeshEdge edge) {
     const auto other = static_cast<std::uint32_t>(mesh_.neighbours[edge.triangle][edge.k]);
     const std::uint32_t d = sheet_.chartOf(other);
@@ -111,10 +88,6 @@ class PartMerger {
     const double length = sheet_.length(edge);
     border.length += length;
     border.crease += length * std::max(0.0, bend) * (mesh_.hard[edge.triangle][edge.k] ? 1.0 : kSmoothCrease);
-  }
-
-  void push(std::uint32_t border) {
-    if (const double c = cost(border); std::isfinite(c)) queue_.push({static_cast<float>(c), border});
   }
 
   double cost(std::uint32_t index) const {
@@ -208,7 +181,7 @@ class PartMerger {
     members_[from].clear();
     borders_.merge(from, into, [](std::uint32_t) {});
     // What was refused may fit the grown chart.
-    borders_.forEachOf(into, [this](std::uint32_t border) { push(border); });
+    borders_.forEachOf(into, [this](std::uint32_t border) { queue_.push(border, [this](std::uint32_t b) { return cost(b); }); });
   }
 
   std::vector<FlatChart> collect() {
@@ -238,7 +211,7 @@ class PartMerger {
   BorderGraph<Border> borders_;
   Phase phase_ = Phase::All;
   std::vector<std::vector<std::uint32_t>> members_;    // per chart: the charts that it is made of
-  std::priority_queue<Candidate> queue_;
+  BorderQueue queue_;
 };
 
 std::uint32_t findRoot(std::vector<std::uint32_t>& parent, std::uint32_t x) {

@@ -72,7 +72,7 @@ void BM_PackPages(benchmark::State& state) {
   Progress silent;
   for (auto _ : state) benchmark::DoNotOptimize(packCharts(shapes, {.pageSize = 1024, .padding = 2}, silent));
 }
-BENCHMARK(BM_PackPages)->Arg(1000)->Arg(10000)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(BM_PackPages)->Arg(100)->Arg(1000)->Arg(10000)->Arg(30000)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 /// One step of the search for a density: percent of the page as area, which fits or fails.
 void BM_PackOnePage(benchmark::State& state) {
@@ -137,6 +137,8 @@ void BM_Dilate(benchmark::State& state) {
     benchmark::DoNotOptimize(image.pixels.data());
   }
 }
+BENCHMARK(BM_Dilate)->Arg(4)->Unit(benchmark::kMillisecond)->UseRealTime();
+
 /// A page of 1024 x 1024, nine tenths of it in charts of 96 x 96, under noise: as a preview leaves it.
 void BM_Denoise(benchmark::State& state) {
   const int side = 1024;
@@ -159,8 +161,6 @@ void BM_Denoise(benchmark::State& state) {
   }
 }
 BENCHMARK(BM_Denoise)->Arg(1)->Arg(2)->Arg(4)->Unit(benchmark::kMillisecond)->UseRealTime();
-
-BENCHMARK(BM_Dilate)->Arg(4)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace
 }  // namespace lumel
