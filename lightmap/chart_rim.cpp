@@ -14,10 +14,11 @@ std::uint64_t cellKey(std::int64_t x, std::int64_t y) {
 
 std::int64_t cellOf(double x) { return static_cast<std::int64_t>(std::floor(x / kNearTexels)); }
 
+/// Whether any point of the edge but its last, which is another edge's first, is what `visit` looks for.
 template <class Visit>
 bool anyPoint(const ChartRim::Edge& edge, Visit visit) {
   const int steps = 1 + static_cast<int>(std::min(1e6, glm::length(edge.uvB - edge.uvA)));
-  for (int i = 0; i <= steps; ++i) {
+  for (int i = 0; i < steps; ++i) {
     const double s = static_cast<double>(i) / steps;
     if (visit(edge.uvA + s * (edge.uvB - edge.uvA), edge.a + s * (edge.b - edge.a))) return true;
   }
