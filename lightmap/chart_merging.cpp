@@ -16,6 +16,7 @@ namespace lumel {
 namespace {
 
 constexpr double kSmoothCrease = 0.25;  // weight of a crease that is shaded smooth
+constexpr double kRescaledTexels = 16.0;  // charts of less area are scaled to it after parts of them were squeezed
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 struct Border {
@@ -137,12 +138,16 @@ class PartMerger {
     return false;
   }
 
-  /// Hangs a small chart on by any one edge, squeezed as far as its stretch may go where it does not fit otherwise.
+  /// Hangs a small chart on by any one edge. Where it does not fit it is squeezed, as far as its stretch may go and the
+  /// density of both together stays within 2%; that of charts that are small together is set right in the end.
   bool hang(std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared) {
     if (phase_ == Phase::All) return false;
-    const double limit = options_.maxStretch * std::sqrt(smallChartSlack(sheet_.chart(from).normals.area));
+    constexpr double kMostLoss = 0.04;  // of the area
+    const double area = sheet_.chart(from).normals.area;
+    const double both = area + sheet_.chart(into).normals.area;
+    const double limit = options_.maxStretch * std::sqrt(smallChartSlack(area));
     for (const double scale : {1.0, 0.7, 0.5, 0.35}) {
-      if (scale * limit < 1) break;
+      if (scale * limit < 1 || (both > kRescaledTexels && (1 - scale * scale) * area > kMostLoss * both)) break;
       for (const Fit& fit : sheet_.hangings(shared, scale)) {
         if (!sheet_.mayJoin(into, from, fit, frameGap(), options_)) continue;
         sheet_.join(into, from, fit);
@@ -193,6 +198,7 @@ class PartMerger {
         continue;
       }
       FlatChart merged = sheet_.take(c);
+      if (sheet_.chart(c).normals.area <= kRescaledTexels) scaleToSurface(merged.mesh, merged.uvs);
       // The border test does not see everything (slivers along a border): what fails in full stays apart.
       constexpr double kOverlapTexels = 2e-3;
       if (!overlapsItself(merged.mesh, merged.uvs, kOverlapTexels)) {
