@@ -119,14 +119,14 @@ Expected<void> convertMap(const std::filesystem::path& input, const std::filesys
     metadata["lumel:content"] = "normal map recovered from the ssbump map";
     metadata["lumel:green"] = settings.to.green == Green::Up ? "up" : "down";
   }
-  auto writer = MapWriter::open(output, image.width, image.height, image.channels,
+  FileSet files;
+  auto writer = MapWriter::open(files, output, image.width, image.height, image.channels,
                                 settings.to.encoding ? MapKind::Weights : MapKind::Normals, settings.options,
                                 loaded->channelNames, metadata);
   if (!writer) return writer.error();
   if (auto done = writer->write(image, progress); !done) return done;
-  std::vector<PendingFile> files;
   if (auto done = writer->finish(files, progress); !done) return done;
-  return putInPlace(files);
+  return files.commit();
 }
 
 }  // namespace lumel::ssbump

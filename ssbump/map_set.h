@@ -60,6 +60,7 @@ class MapSet {
   void modulate(Image& rows) const;
   void addAlpha(Image& rows) const;
 
+  FileSet files_;
   MapSettings settings_;
   int width_ = 0, height_ = 0, row_ = 0;
   std::vector<Lobe> lobes_;
