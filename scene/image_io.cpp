@@ -227,7 +227,8 @@ Expected<ImageWriter> ImageWriter::open(const PendingFile& file, int width, int 
                               : options.format == PixelFormat::Half ? OIIO::TypeDesc::HALF
                                                                     : OIIO::TypeDesc::FLOAT;
   auto state = std::make_unique<State>();
-  state->output = OIIO::ImageOutput::create(name);
+  // Without an extension OpenImageIO takes the name for one.
+  if (file.place.has_extension()) state->output = OIIO::ImageOutput::create(name);
   if (!state->output || !state->output->supports("ioproxy")) {
     OIIO::geterror();
     return usageError(name + ": unknown image type; use .exr, .png, .tga, .tif or .hdr");

@@ -47,22 +47,15 @@ std::string wordAfter(const std::string& text, const std::string& key) {
 /// Blends and fades in the ssbump domain; a normal map has become squared weights before.
 Expected<void> combine(Image& image, const Encoding& encoding, const MapForm& form, const ConvertSettings& settings,
                        const Progress& progress) {
-  const auto second = [&](const std::filesystem::path& file) -> Expected<Image> {
-    auto loaded = readMap(file, progress);
-    if (!loaded) return loaded.error();
-    if (!form.encoding)
-      forEachTexel(loaded->image, [&](const Vec3& c) { return normalWeights(decodeNormal(c, form.green)); });
-    return std::move(loaded->image);
-  };
   if (!settings.crossFade.empty()) {
-    auto other = second(settings.crossFade);
+    auto other = readMapAs(settings.crossFade, form, encoding, progress);
     if (!other) return other.error();
     auto faded = crossFade(image, *other, encoding, settings.crossFadeAmount);
     if (!faded) return faded.error();
     image = std::move(*faded);
   }
   if (!settings.detail.empty()) {
-    auto detail = second(settings.detail);
+    auto detail = readMapAs(settings.detail, form, encoding, progress);
     if (!detail) return detail.error();
     blendDetail(image, *detail, encoding, settings.detailRepeats);
   }
@@ -91,6 +84,17 @@ std::optional<MapForm> formFromMetadata(const LoadedImage& image) {
   const auto h = parseHand(hand);
   if (!c || !h) return std::nullopt;
   return MapForm{Encoding{*c, *h}, Green::Up};
+}
+
+Expected<Image> readMapAs(const std::filesystem::path& file, const MapForm& form, const Encoding& encoding,
+                          const Progress& progress) {
+  auto loaded = readMap(file, progress);
+  if (!loaded) return loaded.error();
+  const MapForm own = formFromMetadata(*loaded).value_or(form);
+  if (!own.encoding)
+    forEachTexel(loaded->image, [&](const Vec3& c) { return normalWeights(decodeNormal(c, own.green)); });
+  convert(loaded->image, own.encoding.value_or(Encoding{}), encoding);
+  return std::move(loaded->image);
 }
 
 Expected<void> convertMap(const std::filesystem::path& input, const std::filesystem::path& output,

@@ -5,6 +5,7 @@
 #include "lightmap/rnm_basis.h"
 #include "scene/check.h"
 #include "scene/parallel.h"
+#include "ssbump/convert.h"
 
 namespace lumel::ssbump {
 namespace {
@@ -73,9 +74,9 @@ Expected<MapSet> MapSet::open(const MapSettings& settings, int width, int height
     set.albedo_ = std::move(*albedo);
   }
   if (!settings.detail.empty()) {
-    auto detail = readImage(settings.detail, progress);
+    auto detail = readMapAs(settings.detail, {settings.encoding, Green::Up}, settings.encoding, progress);
     if (!detail) return detail.error();
-    set.detail_ = std::move(detail->image);
+    set.detail_ = std::move(*detail);
   }
   const std::span<const Vec3> basis = rnm ? std::span<const Vec3>(kRnmBasis) : std::span<const Vec3>(settings.basis);
   for (const Vec3& axis : basis) set.lobes_.push_back({axis, settings.lobe, settings.coneOpeningDegrees});

@@ -32,7 +32,7 @@ struct MapSettings {
   float coneOpeningDegrees = 120;
   std::filesystem::path albedo;  // sRGB unless a float file; its luminance multiplies the ssbump map
   std::filesystem::path mask;    // first channel goes to the ssbump map's alpha, untouched
-  std::filesystem::path detail;  // an ssbump map in the same encoding, blended in evenly
+  std::filesystem::path detail;  // an ssbump map (as its metadata say, else in the same encoding), blended in evenly
   float detailRepeats = 1;
 };
 
