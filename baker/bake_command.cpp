@@ -12,9 +12,9 @@
 #include "baker/quality.h"
 #include "baker/scene_arguments.h"
 #include "baker/stage_clock.h"
-#include "baker/staging.h"
 #include "lightmap/atlas.h"
 #include "lightmap/texels.h"
+#include "scene/file_set.h"
 #include "scene/parallel.h"
 
 namespace lumel {
@@ -178,7 +178,7 @@ Expected<AtlasResult> makeAtlas(const Scene& scene, const BakeArguments& a, Comm
 
 Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   if (auto checked = check(a); !checked) return checked;
-  Staging::recover(a.output);
+  FileSet::recover(a.output);
   if (auto writable = checkWritable(a.output); !writable) return writable;
   const ThreadLimit limit(a.threads);
   const int samples = samplesOf(a);

@@ -3,7 +3,6 @@
 #include "baker/bake_json.h"
 #include "baker/conventions.h"
 #include "baker/glb_writer.h"
-#include "baker/staging.h"
 #include "baker/version.h"
 #include "scene/image_io.h"
 #include "scene/parallel.h"
@@ -45,25 +44,29 @@ std::map<std::string, std::string> pageMetadata(std::size_t page, const std::str
 
 /// One image of a bake on its way to its file.
 struct ImageFile {
-  fs::path file;
+  PendingFile file;
   const Image* image;
   WriteImageOptions options;
 };
 
-void addPage(Staging& staging, std::size_t page, const BakedPage& baked, const BakeRecord& record,
-             std::vector<ImageFile>& files) {
+Expected<void> addPage(FileSet& set, const fs::path& dir, std::size_t page, const BakedPage& baked,
+                       const BakeRecord& record, std::vector<ImageFile>& files) {
   WriteImageOptions options;
   options.format = record.half ? PixelFormat::Half : PixelFormat::Float;
-  const auto add = [&](const std::string& kind, const Image& image) {
+  const auto add = [&](const std::string& kind, const Image& image) -> Expected<void> {
     options.metadata = pageMetadata(page, kind, record);
-    files.push_back({staging.file(pageFileName(page, kind)), &image, options});
+    auto file = set.add(dir / pageFileName(page, kind));
+    if (!file) return file.error();
+    files.push_back({std::move(*file), &image, options});
+    return {};
   };
-  for (std::size_t i = 0; i < 3; ++i) add("rnm" + std::to_string(i), baked.rnm[i]);
-  add("flat", baked.flat);
+  for (std::size_t i = 0; i < 3; ++i)
+    if (auto added = add("rnm" + std::to_string(i), baked.rnm[i]); !added) return added;
+  if (auto added = add("flat", baked.flat); !added) return added;
   // Sample counts and coverage are exact in float only.
   options.format = PixelFormat::Float;
   options.channelNames = {"coverage", "validity", "stderr", "samples"};
-  add("aux", baked.aux);
+  return add("aux", baked.aux);
 }
 
 /// Compression takes most of the time, and a file at a time leaves cores idle.
@@ -85,20 +88,27 @@ std::string pageFileName(std::size_t page, const std::string& kind) {
 
 Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasResult& atlas, const BakeResult& result,
                          const BakeRecord& record) {
-  auto staging = Staging::make(dir);
-  if (!staging) return staging.error();
+  auto set = FileSet::forFolder(dir);
+  if (!set) return set.error();
   std::vector<ImageFile> files;
   for (std::size_t page = 0; page < result.pages.size(); ++page)
-    addPage(*staging, page, result.pages[page], record, files);
+    if (auto added = addPage(*set, dir, page, result.pages[page], record, files); !added) return added;
+  if (!scene.environment.isBlack() && !scene.environment.image.empty()) {
+    auto sky = set->add(dir / "sky.exr");
+    if (!sky) return sky.error();
+    files.push_back({std::move(*sky), &scene.environment.image, {}});
+  }
   if (auto done = writeImages(files); !done) return done;
-  if (!scene.environment.isBlack() && !scene.environment.image.empty())
-    if (auto done = writeImage(staging->file("sky.exr"), scene.environment.image); !done) return done;
+  const auto writeFile = [&](const char* name, const auto& bytes) -> Expected<void> {
+    const auto file = set->add(dir / name);
+    if (!file) return file.error();
+    return writeBytes(*file, bytes.data(), bytes.size());
+  };
   const auto glb = encodeGlb(scene, atlas.atlas);
   if (!glb) return glb.error();
-  if (auto done = writeBytes(staging->file("scene.glb"), glb->data(), glb->size()); !done) return done;
-  const std::string json = describeBake(scene, atlas, result, record);
-  if (auto done = writeBytes(staging->file("bake.json"), json.data(), json.size()); !done) return done;
-  return staging->commit([](const std::string& name) { return isPageImage(name) || name == "sky.exr"; });
+  if (auto done = writeFile("scene.glb", *glb); !done) return done;
+  if (auto done = writeFile("bake.json", describeBake(scene, atlas, result, record)); !done) return done;
+  return set->commitFolder([](const std::string& name) { return isPageImage(name) || name == "sky.exr"; });
 }
 
 }  // namespace lumel

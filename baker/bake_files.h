@@ -39,7 +39,7 @@ inline constexpr int kBakeFormat = 1;
 /// needed). Everything is written to a folder inside `dir` first; the old result stays whole until all of the new one
 /// is on disk. Then the old files move into that folder, bake.json first, and the new ones to their places, bake.json
 /// last; if a step fails, the old ones are put back. Nothing of an older, larger bake stays.
-/// Killed between these renames, `dir` has no bake.json, so nothing is taken for a bake, until Staging::recover.
+/// Killed between these renames, `dir` has no bake.json, so nothing is taken for a bake, until FileSet::recover.
 /// Everything but bake.json's "run" (times, threads, memory) is the same for the same scene and settings.
 /// Errors: Failed.
 Expected<void> writeBake(const std::filesystem::path& dir, const Scene& scene, const AtlasResult& atlas,

@@ -18,6 +18,7 @@ struct CommandContext {
   std::ostream& out;                // standard output: what the user asked to see
   bool quiet = false;               // nothing on stderr but errors
   nlohmann::ordered_json settings;  // every option of the subcommand as resolved
+  const OptionTable& options;
 };
 
 /// `run` is called after all options are set. The option targets live in the closure of `run`.

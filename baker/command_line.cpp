@@ -131,7 +131,8 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
   Parsed& parsed = *chosen();
   if (auto filled = fillOptions(parsed, names); !filled) return filled;
   TerminalProgress progress(parsed.quiet);
-  CommandContext context{progress, out, parsed.quiet, parsed.command.options.resolved()};
+  CommandContext context{progress, out, parsed.quiet, parsed.command.options.resolved(),
+                         parsed.command.options};
   return parsed.command.run(context);
 }
 

@@ -7,10 +7,10 @@
 #include "baker/bake_files.h"
 #include "baker/command.h"
 #include "baker/compositor.h"
-#include "baker/staging.h"
 #include "baker/tone_map.h"
 #include "baker/version.h"
 #include "baker/viewpoint.h"
+#include "scene/file_set.h"
 #include "scene/image_io.h"
 #include "scene/parallel.h"
 

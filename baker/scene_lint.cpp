@@ -43,15 +43,16 @@ Json sceneUvJson(const UvReport& r) {
 }
 
 Expected<void> writePictures(const Atlas& atlas, const std::filesystem::path& folder) {
-  std::error_code ec;
-  std::filesystem::create_directories(folder, ec);
+  auto files = FileSet::forFolder(folder);
+  if (!files) return files.error();
+  WriteImageOptions options;
+  options.format = PixelFormat::U8;
   for (int page = 0; page < static_cast<int>(atlas.pages.size()); ++page) {
-    WriteImageOptions options;
-    options.format = PixelFormat::U8;
-    const auto file = folder / ("charts-" + std::to_string(page) + ".png");
-    if (Expected<void> written = writeImage(file, chartPicture(atlas, page), options); !written) return written.error();
+    const auto file = files->add(folder / ("charts-" + std::to_string(page) + ".png"));
+    if (!file) return file.error();
+    if (auto written = writeImage(*file, chartPicture(atlas, page), options); !written) return written;
   }
-  return {};
+  return files->commit();
 }
 
 }  // namespace

@@ -1,8 +1,10 @@
 // lumel ssbump: self-shadowed bump maps from height maps and meshes, and the ways from one map to another.
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
 #include "baker/ssbump_command.h"
+#include "scene/file_set.h"
 #include "scene/parallel.h"
 #include "ssbump/basis_file.h"
 #include "ssbump/contact_sheet.h"
@@ -150,15 +152,16 @@ void tell(const CommandContext& context, const BakeReport& report) {
   for (const std::string& warning : report.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
 }
 
-bool isMesh(const fs::path& file) {
+bool hasExtension(const fs::path& file, std::initializer_list<std::string_view> extensions) {
   std::string e = file.extension().string();
   for (char& c : e)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return e == ".gltf" || e == ".glb" || e == ".obj";
+  return std::find(extensions.begin(), extensions.end(), e) != extensions.end();
 }
 
+bool isMesh(const fs::path& file) { return hasExtension(file, {".gltf", ".glb", ".obj"}); }
+
 Expected<void> runMesh(const SsbumpArguments& a, CommandContext& context) {
-  if (!a.study.empty() || !a.contactSheet.empty()) return usageError("--study and --contact-sheet take a height map");
   auto maps = mapSettings(a);
   if (!maps) return maps.error();
   MeshSettings settings;
@@ -189,16 +192,64 @@ Expected<void> runStudy(const SsbumpArguments& a, const BakeSettings& settings, 
   return writeStudy(map, a.input.filename().string(), a.study, context.progress);
 }
 
-Expected<void> runSsbump(const SsbumpArguments& a, CommandContext& context) {
+/// An option that would change nothing is a mistake: whoever gives it expects something else than would come.
+Expected<void> checkUse(const SsbumpArguments& a, const OptionTable& options) {
+  const bool convert = a.convert || !a.crossFade.empty(), mesh = !convert && isMesh(a.input),
+             heights = !convert && !mesh, rays = mesh || (heights && a.method == BackEnd::Rays);
+  const MapFiles& save = a.save;
+  bool dds = false;
+  for (const fs::path* file :
+       {&a.output, &save.weights, &save.occlusion, &save.ambient, &save.normal, &save.recovered})
+    dds = dds || hasExtension(*file, {".dds"});
+  struct Rule {
+    bool holds;
+    const char* with;
+    std::vector<const char*> options;
+  };
+  const std::vector<Rule> rules{
+      {heights, "a height map", {"height-scale", "channel", "invert", "bilateral", "normal-map", "method", "reach"}},
+      {heights, "a height map", {"contact-sheet", "study"}},
+      {mesh, "a mesh (.gltf, .glb, .obj)", {"low", "width", "height", "tile-width", "tile-height"}},
+      {mesh && !a.low.empty(), "--low", {"uv-set", "cage", "dilate"}},
+      {!convert, "heights or a mesh; with --convert, --to says what to write", {"convention"}},
+      {!convert, "heights or a mesh", {"lobe", "basis", "mask", "save-weights", "save-occlusion"}},
+      {!convert, "heights or a mesh", {"save-ao", "save-normal", "save-recovered"}},
+      {convert, "--convert", {"from", "from-hand", "to"}},
+      {!a.crossFade.empty(), "--cross-fade", {"amount"}},
+      {heights && !rays, "heights and --method horizon", {"azimuths"}},
+      {rays, "--method rays or a mesh", {"rays", "sampling", "seed"}},
+      {a.lobe == LobeShape::Cone, "--lobe cone", {"cone-angle"}},
+      {a.bilateral > 0, "--bilateral", {"bilateral-threshold"}},
+      {convert || !a.normalMap.empty(), "--normal-map or --convert", {"green"}},
+      {!a.detail.empty(), "--detail", {"detail-repeats"}},
+      {a.mips || dds, "--mips or a .dds file", {"mip-filter"}},
+      {dds, "a .dds file", {"blocks"}},
+  };
+  for (const Rule& rule : rules)
+    for (const char* name : rule.options)
+      if (!rule.holds && options.isGiven(name))
+        return usageError(std::string("--") + name + " goes with " + rule.with);
+  if ((a.tileWidth > 0) != (a.tileHeight > 0)) return usageError("--tile-width and --tile-height go together");
+  return {};
+}
+
+/// What is written after the long work must be known to be possible before it.
+Expected<void> checkPlaces(const SsbumpArguments& a) {
   if (a.output.empty() && a.study.empty() && a.contactSheet.empty())
     return usageError("-o FILE is missing: where the ssbump map goes (or --study DIR, --contact-sheet FILE)");
+  if (!a.study.empty())
+    if (auto writable = checkWritable(a.study); !writable) return writable;
+  if (!a.contactSheet.empty())
+    if (auto place = FileSet().add(a.contactSheet); !place) return place.error();
+  return {};
+}
+
+Expected<void> runSsbump(const SsbumpArguments& a, CommandContext& context) {
+  if (auto good = checkUse(a, context.options); !good) return good;
+  if (auto good = checkPlaces(a); !good) return good;
   const ThreadLimit limit(a.threads);
-  if (a.convert || !a.crossFade.empty()) {
-    if (a.output.empty()) return usageError("-o FILE is missing: where the converted map goes");
-    return runConvert(a, context.progress);
-  }
+  if (a.convert || !a.crossFade.empty()) return runConvert(a, context.progress);
   if (isMesh(a.input)) return runMesh(a, context);
-  if (!a.low.empty()) return usageError("--low goes with a mesh (.gltf, .glb, .obj) as input");
   auto settings = bakeSettings(a);
   if (!settings) return settings.error();
   if (!a.study.empty())
@@ -229,7 +280,7 @@ void declareInput(OptionTable& o, SsbumpArguments& a) {
   o.integer("bilateral", a.bilateral, {0, 64},
             "Smooth stair-steps within this radius in texels, keeping edges; 0 = off");
   o.number("bilateral-threshold", a.bilateralThreshold, {0, 1e6f},
-           "Height steps (texels) from this on are edges; 0 = two steps of the file");
+           "Height steps (texels) from this on are edges; 0 = as many of the file's steps as the radius");
   o.path("normal-map", a.normalMap, "Normals for the weights; else from the heights");
   o.choice("green", a.normalGreen, {"up", "down"}, "Green of a normal map that is read: up (OpenGL) or down (DirectX)");
   o.group("Meshes");
@@ -287,7 +338,7 @@ void declareMaps(OptionTable& o, SsbumpArguments& a) {
            "What INPUT holds; file: what its metadata says");
   o.choice("from-hand", a.fromHand, {"right", "left"}, "Handedness of INPUT");
   o.choice("to", a.to, {"squared", "linear", "mod2x", "normal"}, "What to write");
-  o.path("cross-fade", a.crossFade, "Mix INPUT with this map of the same form and size");
+  o.path("cross-fade", a.crossFade, "Mix INPUT with this map of the same size");
   o.number("amount", a.crossFadeAmount, {0, 1}, "Share of the second map in a cross-fade");
   o.path("study", a.study, "Compression study of the map into this folder: study.md, study.png").placeholder = "DIR";
 }
@@ -307,8 +358,14 @@ Command ssbumpCommand() {
       "A sculpted tile and a high-poly prop:\n"
       "  lumel ssbump tile.glb -o tile.exr --width 1024 --height 1024\n"
       "  lumel ssbump prop_high.obj --low prop_low.obj -o prop.png\n"
-      "Back to a normal map, and between conventions:\n"
-      "  lumel ssbump s.png --convert --from squared --to normal -o n.png";
+      "Back to a normal map, and between conventions (maps of lumel say what they hold, others need --from):\n"
+      "  lumel ssbump s.png --convert --to normal -o n.png\n"
+      "  lumel ssbump valve.png --convert --from linear --from-hand left --to squared -o s.png\n"
+      "Fine grain from a map that repeats eight times, and a wall half way to its broken state:\n"
+      "  lumel ssbump h.png -o s.png --detail grain_ssbump.png --detail-repeats 8\n"
+      "  lumel ssbump whole.png --cross-fade broken.png --amount 0.5 -o half.png\n"
+      "What formats and mip levels cost on this map, as tables and pictures; a look at all maps at once:\n"
+      "  lumel ssbump h.png --study study --contact-sheet sheet.png";
   declareInput(command.options, *arguments);
   declareOcclusion(command.options, *arguments);
   declareMaps(command.options, *arguments);

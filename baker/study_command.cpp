@@ -5,8 +5,8 @@
 
 #include "baker/command.h"
 #include "baker/scene_arguments.h"
-#include "baker/staging.h"
 #include "baker/study_files.h"
+#include "scene/file_set.h"
 #include "scene/parallel.h"
 
 namespace lumel {

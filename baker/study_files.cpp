@@ -4,8 +4,8 @@
 #include <cstdio>
 
 #include "baker/plot.h"
-#include "baker/staging.h"
 #include "baker/version.h"
+#include "scene/file_set.h"
 
 namespace lumel {
 namespace {
@@ -175,10 +175,12 @@ std::string studyMarkdown(const Study& study, const std::string& scene) {
 }
 
 Expected<void> writeStudy(const fs::path& dir, const Study& study, const std::string& scene, const Json& settings) {
-  auto staging = Staging::make(dir);
-  if (!staging) return staging.error();
-  const auto write = [&](const std::string& name, const std::string& text) {
-    return writeBytes(staging->file(name), text.data(), text.size());
+  auto files = FileSet::forFolder(dir);
+  if (!files) return files.error();
+  const auto write = [&](const std::string& name, const std::string& text) -> Expected<void> {
+    const auto file = files->add(dir / name);
+    if (!file) return file.error();
+    return writeBytes(*file, text.data(), text.size());
   };
   const Plot rays = errorPlot(study, "Error against rays: " + scene, "rays per texel, all kinds", raysPerTexel);
   const Plot time =
@@ -189,7 +191,7 @@ Expected<void> writeStudy(const fs::path& dir, const Study& study, const std::st
   if (auto done = write("error-time.svg", plotSvg(time)); !done) return done;
   if (auto done = write("density.svg", plotSvg(densityPlot(study))); !done) return done;
   if (auto done = write("study.json", studyJson(study, settings)); !done) return done;
-  return staging->commit([](const std::string&) { return false; });
+  return files->commitFolder({});
 }
 
 }  // namespace lumel

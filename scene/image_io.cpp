@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <system_error>
 
 #include "scene/check.h"
@@ -33,6 +34,32 @@ bool storesPalette(const OIIO::ImageSpec& spec, std::string_view format, const H
   return format == "gif" || spec.get_string_attribute("tiff:ColorSpace") == "palette";
 }
 
+/// Whether a PNG goes on to its last chunk. libpng finds that out too, but says so on standard error.
+bool isWholePng(std::uint64_t size, const std::function<bool(std::uint64_t at, std::span<std::uint8_t> bytes)>& read) {
+  constexpr std::uint64_t kSignature = 8, kLengthTypeAndSum = 12;
+  std::array<std::uint8_t, 8> head{};
+  for (std::uint64_t at = kSignature; at + kLengthTypeAndSum <= size;) {
+    if (!read(at, head)) return false;
+    std::uint64_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i) length = length << 8 | head[i];
+    at += length + kLengthTypeAndSum;
+    if (std::equal(head.begin() + 4, head.end(), "IEND")) return at <= size;
+  }
+  return false;
+}
+
+bool isPng(const Head& head) {
+  constexpr std::array<std::uint8_t, 8> kSignature{0x89, 'P', 'N', 'G', 13, 10, 26, 10};
+  return std::equal(kSignature.begin(), kSignature.end(), head.begin());
+}
+
+Error cutOff(const std::string& name) { return inputError(name + ": is cut off: the file ends before the image does"); }
+
+Error unreadable(const std::string& name, const std::string& why) {
+  return inputError(name + ": not an image that can be read" + (why.empty() ? "" : ": ") +
+                    why.substr(0, why.find('\n')));
+}
+
 Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& name, const Head& head,
                                  const Progress& progress = noProgress()) {
   const OIIO::ImageSpec& spec = input.spec();
@@ -50,12 +77,16 @@ Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& nam
     if (attribute.type().basetype == OIIO::TypeDesc::STRING || attribute.type().basevalues() == 1)
       loaded.metadata[attribute.name().string()] = attribute.get_string();
   loaded.image = Image(spec.width, spec.height, spec.nchannels);
+  const std::string noteOfHead = input.geterror();
   const auto stop = [](void* p, float) { return static_cast<const Progress*>(p)->cancelled(); };
   const bool read = input.read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, loaded.image.pixels.data(),
                                      OIIO::AutoStride, OIIO::AutoStride, OIIO::AutoStride, stop,
                                      const_cast<Progress*>(&progress));
   if (progress.cancelled()) return interrupted();
-  if (!read) return inputError(name + ": cannot be read: " + input.geterror());
+  // Some readers fill in what is missing, note it and go on. What libjpeg skips between markers does no harm.
+  const std::string note = input.geterror();
+  if ((noteOfHead + note).find("remature end of") != std::string::npos) return cutOff(name);
+  if (!read || (!note.empty() && loaded.format != "jpeg")) return unreadable(name, note);
   return loaded;
 }
 
@@ -92,59 +123,94 @@ std::array<int, 2> imageSize(std::span<const std::uint8_t> encoded) {
 }
 
 Expected<LoadedImage> readImage(const std::filesystem::path& file, const Progress& progress) {
+  const std::string name = file.string();
   std::error_code ec;
-  if (!std::filesystem::is_regular_file(file, ec)) return inputError(file.string() + ": no such file");
+  if (!std::filesystem::is_regular_file(file, ec)) return inputError(name + ": no such file");
+  std::ifstream bytes(file, std::ios::binary);
+  const auto read = [&](std::uint64_t at, std::span<std::uint8_t> into) {
+    bytes.clear();
+    bytes.seekg(static_cast<std::streamoff>(at));
+    bytes.read(reinterpret_cast<char*>(into.data()), static_cast<std::streamsize>(into.size()));
+    return bytes.good();
+  };
+  Head head{};
+  read(0, head);
+  if (isPng(head) && !isWholePng(std::filesystem::file_size(file, ec), read)) return cutOff(name);
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
-  auto input = OIIO::ImageInput::open(file.string(), &config);
-  if (!input) return inputError(file.string() + ": not an image that can be read: " + OIIO::geterror());
-  Head head{};
-  std::ifstream(file, std::ios::binary).read(reinterpret_cast<char*>(head.data()), head.size());
-  return readOpened(*input, file.string(), head, progress);
+  auto input = OIIO::ImageInput::open(name, &config);
+  if (!input) return unreadable(name, OIIO::geterror());
+  return readOpened(*input, name, head, progress);
 }
 
 Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std::string& name) {
+  const auto read = [&](std::uint64_t at, std::span<std::uint8_t> into) {
+    std::copy_n(encoded.begin() + static_cast<std::ptrdiff_t>(at), into.size(), into.begin());
+    return true;
+  };
   Head head{};
   std::copy_n(encoded.begin(), std::min(encoded.size(), head.size()), head.begin());
+  if (isPng(head) && !isWholePng(encoded.size(), read)) return cutOff(name);
   OIIO::Filesystem::IOMemReader memory(const_cast<std::uint8_t*>(encoded.data()), encoded.size());
   const char* format = formatOf(encoded);
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
   auto input = OIIO::ImageInput::open(std::string("memory.") + format, &config, &memory);
-  if (!input) {
-    // Readers without memory support go through a temporary file.
-    static std::atomic<int> counter{0};
-    const auto file = std::filesystem::temp_directory_path() /
-                      ("lumel-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + "." + format);
-    if (FILE* f = std::fopen(file.c_str(), "wb")) {
-      const bool written = std::fwrite(encoded.data(), 1, encoded.size(), f) == encoded.size();
-      std::fclose(f);
-      input = written ? OIIO::ImageInput::open(file.string(), &config) : nullptr;
-      auto result =
-          input ? readOpened(*input, name, head)
-                : Expected<LoadedImage>(inputError(name + ": not an image that can be read: " + OIIO::geterror()));
-      std::error_code ec;
-      std::filesystem::remove(file, ec);
-      return result;
-    }
-    return inputError(name + ": not an image that can be read: " + OIIO::geterror());
-  }
-  return readOpened(*input, name, head);
+  if (input) return readOpened(*input, name, head);
+  // Readers without memory support go through a temporary file.
+  static std::atomic<int> counter{0};
+  const auto file = std::filesystem::temp_directory_path() /
+                    ("lumel-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + "." + format);
+  if (writeBytes({name, file}, encoded.data(), encoded.size())) input = OIIO::ImageInput::open(file.string(), &config);
+  auto result = input ? readOpened(*input, name, head) : unreadable(name, OIIO::geterror());
+  std::error_code ec;
+  std::filesystem::remove(file, ec);
+  return result;
 }
 
+namespace {
+
+/// A file that remembers what went wrong: some encoders (PNG's above all) do not tell when the disk is full.
+class CheckedFile : public OIIO::Filesystem::IOFile {
+ public:
+  explicit CheckedFile(std::FILE* file) : IOFile(file, Write) {}
+  ~CheckedFile() override { std::fclose(handle()); }
+
+  std::size_t write(const void* data, std::size_t size) override {
+    const std::size_t written = IOFile::write(data, size);
+    if (written != size) note();
+    return written;
+  }
+  /// 0, or the first error of the system. Asks for what stands in buffers, too.
+  int problem() {
+    if (std::fflush(handle()) != 0) note();
+    return problem_;
+  }
+
+ private:
+  void note() { problem_ = problem_ != 0 ? problem_ : errno; }
+  int problem_ = 0;
+};
+
+}  // namespace
+
 struct ImageWriter::State {
-  explicit State(const std::filesystem::path& file) : pending(file) {}
-  PendingFile pending;
+  PendingFile file;
+  std::unique_ptr<CheckedFile> bytes;  // outlives the encoder
   std::unique_ptr<OIIO::ImageOutput> output;
   OIIO::ImageSpec spec;
   PixelFormat format = PixelFormat::Float;
-  int width = 0, height = 0, channels = 0, nextRow = 0;
+  int nextRow = 0;
   bool complete = false;
 
-  std::string name() const { return pending.file().string(); }
-  Error failed(const std::string& why) const { return failure(name() + ": cannot be written: " + why); }
+  Error failed() const {
+    const int problem = bytes->problem();
+    const std::string why = output->geterror();  // taken in any case, or it would be printed at exit
+    return cannotWrite(file.place, problem != 0 ? std::strerror(problem) : why);
+  }
   ~State() {
     if (!complete && nextRow > 0) output->close();
+    if (output) output->geterror();
   }
 };
 
@@ -153,46 +219,46 @@ ImageWriter::ImageWriter(ImageWriter&&) noexcept = default;
 ImageWriter& ImageWriter::operator=(ImageWriter&&) noexcept = default;
 ImageWriter::~ImageWriter() = default;
 
-Expected<ImageWriter> ImageWriter::open(const std::filesystem::path& file, int width, int height, int channels,
+Expected<ImageWriter> ImageWriter::open(const PendingFile& file, int width, int height, int channels,
                                         const WriteImageOptions& options) {
-  const std::string name = file.string();
+  const std::string name = file.place.string();
   const OIIO::TypeDesc type = options.format == PixelFormat::U8     ? OIIO::TypeDesc::UINT8
                               : options.format == PixelFormat::U16  ? OIIO::TypeDesc::UINT16
                               : options.format == PixelFormat::Half ? OIIO::TypeDesc::HALF
                                                                     : OIIO::TypeDesc::FLOAT;
-  auto state = std::make_unique<State>(file);
-  state->output = OIIO::ImageOutput::create(name);
-  if (!state->output) return usageError(name + ": unknown image type; use .exr, .png, .tga, .tif or .hdr");
+  auto state = std::make_unique<State>();
+  // Without an extension OpenImageIO takes the name for one.
+  if (file.place.has_extension()) state->output = OIIO::ImageOutput::create(name);
+  if (!state->output || !state->output->supports("ioproxy")) {
+    OIIO::geterror();
+    return usageError(name + ": unknown image type; use .exr, .png, .tga, .tif or .hdr");
+  }
   OIIO::ImageSpec spec(width, height, channels, type);
   if (!options.channelNames.empty()) spec.channelnames = options.channelNames;
   spec.attribute("oiio:UnassociatedAlpha", 1);
-  if (std::string_view(state->output->format_name()) == "openexr") {
-    spec.attribute("compression", "zip");
-    // OpenImageIO adds the time of day where there is none, and equal images would be unequal files.
-    spec.attribute("DateTime", "");
-  }
+  if (std::string_view(state->output->format_name()) == "openexr") spec.attribute("compression", "zip");
+  // OpenImageIO adds the time of day where there is none, and equal images would be unequal files.
+  spec.attribute("DateTime", "");
   for (const auto& [key, value] : options.metadata) spec.attribute(key, value);
+  state->file = file;
   state->format = options.format;
-  state->width = width;
-  state->height = height;
-  state->channels = channels;
   state->spec = std::move(spec);
-  // The encoder opens with the first rows (libpng complains aloud about a file without any), so try the place itself
-  // now.
-  std::FILE* trial = std::fopen(state->pending.temporary().c_str(), "wb");
-  if (!trial) return state->failed(std::strerror(errno));
-  std::fclose(trial);
+  std::FILE* bytes = std::fopen(file.path.c_str(), "w+b");
+  if (!bytes) return cannotWrite(file.place, std::strerror(errno));
+  state->bytes = std::make_unique<CheckedFile>(bytes);
   return ImageWriter(std::move(state));
 }
 
 Expected<void> ImageWriter::write(const Image& rows, const Progress& progress) {
   State& s = *state_;
-  LUMEL_CHECK(rows.width == s.width && rows.channels == s.channels && s.nextRow + rows.height <= s.height);
+  LUMEL_CHECK(rows.width == s.spec.width && rows.channels == s.spec.nchannels &&
+              s.nextRow + rows.height <= s.spec.height);
   for (std::size_t i = 0; i < rows.pixels.size(); ++i) {
     const float v = rows.pixels[i];
     const auto where = [&] {
-      const std::size_t pixel = i / static_cast<std::size_t>(s.channels), width = static_cast<std::size_t>(s.width);
-      return s.name() + ": pixel (" + std::to_string(pixel % width) + ", " +
+      const std::size_t pixel = i / static_cast<std::size_t>(rows.channels),
+                        width = static_cast<std::size_t>(rows.width);
+      return s.file.place.string() + ": pixel (" + std::to_string(pixel % width) + ", " +
              std::to_string(pixel / width + static_cast<std::size_t>(s.nextRow)) + ")";
     };
     if (std::isnan(v)) return failure(where() + " is not a number");
@@ -201,43 +267,40 @@ Expected<void> ImageWriter::write(const Image& rows, const Progress& progress) {
   }
   for (int y = 0; y < rows.height; y += kRowsAtOnce) {
     if (progress.cancelled()) return interrupted();
-    if (s.nextRow == 0 && !s.output->open(s.pending.temporary().string(), s.spec))
-      return s.failed(s.output->geterror());
+    // With the first rows: libpng complains aloud about a file without any.
+    if (s.nextRow == 0 && (!s.output->set_ioproxy(s.bytes.get()) || !s.output->open(s.file.path.string(), s.spec)))
+      return s.failed();
     const int count = std::min(kRowsAtOnce, rows.height - y);
     if (!s.output->write_scanlines(s.nextRow, s.nextRow + count, 0, OIIO::TypeDesc::FLOAT, rows.at(0, y)))
-      return s.failed(s.output->geterror());
+      return s.failed();
     s.nextRow += count;
   }
   return {};
 }
 
-Expected<PendingFile> ImageWriter::finish() {
+Expected<void> ImageWriter::finish() {
   State& s = *state_;
-  LUMEL_CHECK(s.nextRow == s.height && !s.complete);
+  LUMEL_CHECK(s.nextRow == s.spec.height && !s.complete);
   s.complete = true;
-  if (!s.output->close()) return s.failed(s.output->geterror());
-  // Some writers (PNG) do not tell when the disk is full: what cannot be read to its end was not written.
-  auto written = OIIO::ImageInput::open(s.pending.temporary().string());
-  std::vector<float> last(static_cast<std::size_t>(s.spec.width) * static_cast<std::size_t>(s.spec.nchannels));
-  if (!written || !written->read_scanline(s.height - 1, 0, OIIO::TypeDesc::FLOAT, last.data())) {
-    OIIO::geterror();  // about reading, of no use here
-    return s.failed("it is not whole; is the disk full?");
-  }
-  return std::move(s.pending);
+  if (!s.output->close() || s.bytes->problem() != 0) return s.failed();
+  return {};
 }
 
-Expected<void> ImageWriter::commit() {
-  auto pending = finish();
-  if (!pending) return pending.error();
-  return putInPlace({&*pending, 1});
-}
-
-Expected<void> writeImage(const std::filesystem::path& file, const Image& image, const WriteImageOptions& options,
+Expected<void> writeImage(const PendingFile& file, const Image& image, const WriteImageOptions& options,
                           const Progress& progress) {
   auto writer = ImageWriter::open(file, image.width, image.height, image.channels, options);
   if (!writer) return writer.error();
   if (auto done = writer->write(image, progress); !done) return done;
-  return writer->commit();
+  return writer->finish();
+}
+
+Expected<void> writeImage(const std::filesystem::path& file, const Image& image, const WriteImageOptions& options,
+                          const Progress& progress) {
+  FileSet set;
+  auto pending = set.add(file);
+  if (!pending) return pending.error();
+  if (auto done = writeImage(*pending, image, options, progress); !done) return done;
+  return set.commit();
 }
 
 Expected<std::vector<std::uint8_t>> encodePng(const Image& image) {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "scene/expected.h"
+#include "scene/file_set.h"
 #include "scene/image.h"
-#include "scene/pending_file.h"
 #include "scene/progress.h"
 
 namespace lumel {
@@ -45,18 +45,20 @@ struct WriteImageOptions {
   std::map<std::string, std::string> metadata;  // string attributes (EXR, TIFF; PNG as text)
 };
 
-/// Writes by the file's extension, to a temporary name beside it that is renamed when complete: a reader never sees
-/// half a file. Values are stored as they are (no colour conversion). Errors: Failed (cannot write), Usage (unknown
-/// extension or a value that the format cannot hold: a finite value beyond 65504 with Half, a NaN anywhere),
-/// Interrupted.
+/// Writes by the file's extension, complete before a reader sees it (a FileSet of one). Values are stored as they are
+/// (no colour conversion). Errors: Failed (cannot write, or a value that the format cannot hold: a finite value beyond
+/// 65504 with Half, a NaN anywhere), Usage (unknown extension), Interrupted.
 Expected<void> writeImage(const std::filesystem::path& file, const Image& image, const WriteImageOptions& options = {},
                           const Progress& progress = noProgress());
 
-/// The same in parts, for images that do not fit in memory: rows from the top down, then commit. Without commit nothing
-/// is left behind.
+/// The same for a file of a set, which puts it in place.
+Expected<void> writeImage(const PendingFile& file, const Image& image, const WriteImageOptions& options = {},
+                          const Progress& progress = noProgress());
+
+/// The same in parts, for images that do not fit in memory: rows from the top down, then finish.
 class ImageWriter {
  public:
-  static Expected<ImageWriter> open(const std::filesystem::path& file, int width, int height, int channels,
+  static Expected<ImageWriter> open(const PendingFile& file, int width, int height, int channels,
                                     const WriteImageOptions& options = {});
   ImageWriter(ImageWriter&&) noexcept;
   ImageWriter& operator=(ImageWriter&&) noexcept;
@@ -64,10 +66,8 @@ class ImageWriter {
 
   /// The next rows.height rows, `rows` as wide and deep as the file.
   Expected<void> write(const Image& rows, const Progress& progress = noProgress());
-  /// Completes the file and puts it in place. Every row must have been written.
-  Expected<void> commit();
-  /// Completes the file under its temporary name, to be put in place with others.
-  Expected<PendingFile> finish();
+  /// Completes the file: every byte has been taken by the system. Every row must have been written.
+  Expected<void> finish();
 
  private:
   struct State;

@@ -69,7 +69,8 @@ Expected<Inputs> readInputs(const std::filesystem::path& input, const BakeSettin
       if (bits == 0) return usageError("--bilateral on a float map needs --bilateral-threshold (in texels of height)");
       const double scale =
           settings.height.scaleIsPercent ? settings.height.scale / 100 * inputs.field.width : settings.height.scale;
-      threshold = static_cast<float>(2 * std::abs(scale) / (std::exp2(bits) - 1));
+      const double step = std::abs(scale) / (std::exp2(bits) - 1);
+      threshold = static_cast<float>(step * std::max(2, settings.bilateralRadius));
     }
     progress.begin("filter", static_cast<std::uint64_t>(inputs.field.height));
     bilateralFilter(inputs.field, settings.bilateralRadius, threshold, progress);

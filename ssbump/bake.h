@@ -18,7 +18,7 @@ enum class BackEnd { Horizon, Rays };
 struct BakeSettings {
   HeightOptions height;
   int bilateralRadius = 0;             // texels; 0: no filter
-  float bilateralThresholdTexels = 0;  // 0: two steps of the file's bit depth (2/255 of the scale for 8 bits)
+  float bilateralThresholdTexels = 0;  // 0: as many steps of the file's bit depth as the radius has texels
   std::filesystem::path normalMap;     // empty: normals derived from the heights
   Green normalMapGreen = Green::Up;
   BackEnd backEnd = BackEnd::Horizon;

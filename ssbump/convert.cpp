@@ -47,22 +47,15 @@ std::string wordAfter(const std::string& text, const std::string& key) {
 /// Blends and fades in the ssbump domain; a normal map has become squared weights before.
 Expected<void> combine(Image& image, const Encoding& encoding, const MapForm& form, const ConvertSettings& settings,
                        const Progress& progress) {
-  const auto second = [&](const std::filesystem::path& file) -> Expected<Image> {
-    auto loaded = readMap(file, progress);
-    if (!loaded) return loaded.error();
-    if (!form.encoding)
-      forEachTexel(loaded->image, [&](const Vec3& c) { return normalWeights(decodeNormal(c, form.green)); });
-    return std::move(loaded->image);
-  };
   if (!settings.crossFade.empty()) {
-    auto other = second(settings.crossFade);
+    auto other = readMapAs(settings.crossFade, form, encoding, progress);
     if (!other) return other.error();
     auto faded = crossFade(image, *other, encoding, settings.crossFadeAmount);
     if (!faded) return faded.error();
     image = std::move(*faded);
   }
   if (!settings.detail.empty()) {
-    auto detail = second(settings.detail);
+    auto detail = readMapAs(settings.detail, form, encoding, progress);
     if (!detail) return detail.error();
     blendDetail(image, *detail, encoding, settings.detailRepeats);
   }
@@ -93,6 +86,17 @@ std::optional<MapForm> formFromMetadata(const LoadedImage& image) {
   return MapForm{Encoding{*c, *h}, Green::Up};
 }
 
+Expected<Image> readMapAs(const std::filesystem::path& file, const MapForm& form, const Encoding& encoding,
+                          const Progress& progress) {
+  auto loaded = readMap(file, progress);
+  if (!loaded) return loaded.error();
+  const MapForm own = formFromMetadata(*loaded).value_or(form);
+  if (!own.encoding)
+    forEachTexel(loaded->image, [&](const Vec3& c) { return normalWeights(decodeNormal(c, own.green)); });
+  convert(loaded->image, own.encoding.value_or(Encoding{}), encoding);
+  return std::move(loaded->image);
+}
+
 Expected<void> convertMap(const std::filesystem::path& input, const std::filesystem::path& output,
                           const ConvertSettings& settings, const Progress& progress) {
   auto loaded = readMap(input, progress);
@@ -119,14 +123,14 @@ Expected<void> convertMap(const std::filesystem::path& input, const std::filesys
     metadata["lumel:content"] = "normal map recovered from the ssbump map";
     metadata["lumel:green"] = settings.to.green == Green::Up ? "up" : "down";
   }
-  auto writer = MapWriter::open(output, image.width, image.height, image.channels,
+  FileSet files;
+  auto writer = MapWriter::open(files, output, image.width, image.height, image.channels,
                                 settings.to.encoding ? MapKind::Weights : MapKind::Normals, settings.options,
                                 loaded->channelNames, metadata);
   if (!writer) return writer.error();
   if (auto done = writer->write(image, progress); !done) return done;
-  std::vector<PendingFile> files;
   if (auto done = writer->finish(files, progress); !done) return done;
-  return putInPlace(files);
+  return files.commit();
 }
 
 }  // namespace lumel::ssbump

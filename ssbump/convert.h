@@ -18,9 +18,9 @@ struct MapForm {
 struct ConvertSettings {
   std::optional<MapForm> from;  // absent: as the file's metadata says
   MapForm to;
-  std::filesystem::path detail;  // an ssbump map in the form of the input, blended in evenly
+  std::filesystem::path detail;  // an ssbump map, blended in evenly
   float detailRepeats = 1;
-  std::filesystem::path crossFade;  // a second map of the input's form and size
+  std::filesystem::path crossFade;  // a second map of the input's size
   float crossFadeAmount = 0.5f;     // 0: the input, 1: the second map
   std::filesystem::path albedo;     // its luminance multiplies the result
   MapOptions options;
@@ -29,6 +29,11 @@ struct ConvertSettings {
 /// Alpha passes through. Errors: Input (too few channels, not finite, unknown form), Usage, Failed, Interrupted.
 Expected<void> convertMap(const std::filesystem::path& input, const std::filesystem::path& output,
                           const ConvertSettings& settings, const Progress& progress = noProgress());
+
+/// A second map for work in `encoding` (detail, cross-fade): three channels and more, brought over from the form that the
+/// file's metadata name, or from `form` where they name none; normal maps become weights. Errors: Input, Interrupted.
+Expected<Image> readMapAs(const std::filesystem::path& file, const MapForm& form, const Encoding& encoding,
+                          const Progress& progress);
 
 /// The form that a file's metadata names, if it names one.
 std::optional<MapForm> formFromMetadata(const LoadedImage& image);

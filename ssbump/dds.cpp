@@ -99,27 +99,20 @@ std::vector<std::uint8_t> encodeLevel(const Image& image, DdsFormat format, cons
 
 }  // namespace
 
-Expected<PendingFile> writeDds(const std::filesystem::path& file, std::span<const Image> levels, DdsFormat format,
-                               const std::string& note, const Progress& progress) {
+Expected<void> writeDds(const PendingFile& file, std::span<const Image> levels, DdsFormat format,
+                        const std::string& note, const Progress& progress) {
   LUMEL_CHECK(!levels.empty());
-  const std::string name = file.string();
   for (const Image& level : levels)
     for (float v : level.pixels)
       if (std::isnan(v) || (format == DdsFormat::Rgba16Half && std::abs(v) > 65504.0f))
-        return failure(name + ": a value is not a number or beyond half's 65504");
-  PendingFile pending(file);
-  std::FILE* out = std::fopen(pending.temporary().c_str(), "wb");
-  if (!out) return failure(name + ": cannot be written: " + std::strerror(errno));
-  const auto put = [&](const std::vector<std::uint8_t>& bytes) {
-    return std::fwrite(bytes.data(), 1, bytes.size(), out) == bytes.size();
-  };
-  bool good = put(header(levels[0].width, levels[0].height, levels.size(), format, note));
-  for (const Image& level : levels) good = good && put(encodeLevel(level, format, progress)) && !progress.cancelled();
-  const int problem = errno;
-  good = std::fclose(out) == 0 && good;
-  if (progress.cancelled()) return interrupted();
-  if (!good) return failure(name + ": cannot be written: " + std::strerror(problem));
-  return pending;
+        return failure(file.place.string() + ": a value is not a number or beyond half's 65504");
+  std::vector<std::uint8_t> bytes = header(levels[0].width, levels[0].height, levels.size(), format, note);
+  for (const Image& level : levels) {
+    const std::vector<std::uint8_t> more = encodeLevel(level, format, progress);
+    if (progress.cancelled()) return interrupted();
+    bytes.insert(bytes.end(), more.begin(), more.end());
+  }
+  return writeBytes(file, bytes.data(), bytes.size());
 }
 
 }  // namespace lumel::ssbump

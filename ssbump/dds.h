@@ -6,8 +6,8 @@
 #include <string>
 
 #include "scene/expected.h"
+#include "scene/file_set.h"
 #include "scene/image.h"
-#include "scene/pending_file.h"
 #include "scene/progress.h"
 
 namespace lumel::ssbump {
@@ -16,9 +16,9 @@ enum class DdsFormat { Rgba8, Rgba16, Rgba16Half, Bc1, Bc3 };
 
 /// Levels from the largest down, each max(1, floor(side / 2)) of the one before; 1 to 4 channels (grey replicates,
 /// alpha 1). `note` (up to 40 characters, for the convention) goes into the header's reserved words, where readers skip
-/// it. Complete under its temporary name, to be put in place. Errors: Failed (cannot write, a value that half cannot
+/// it. Errors: Failed (cannot write, a value that half cannot
 /// hold), Interrupted.
-Expected<PendingFile> writeDds(const std::filesystem::path& file, std::span<const Image> levels, DdsFormat format,
-                               const std::string& note = {}, const Progress& progress = noProgress());
+Expected<void> writeDds(const PendingFile& file, std::span<const Image> levels, DdsFormat format,
+                        const std::string& note = {}, const Progress& progress = noProgress());
 
 }  // namespace lumel::ssbump

@@ -5,6 +5,7 @@
 #include "lightmap/rnm_basis.h"
 #include "scene/check.h"
 #include "scene/parallel.h"
+#include "ssbump/convert.h"
 
 namespace lumel::ssbump {
 namespace {
@@ -73,9 +74,9 @@ Expected<MapSet> MapSet::open(const MapSettings& settings, int width, int height
     set.albedo_ = std::move(*albedo);
   }
   if (!settings.detail.empty()) {
-    auto detail = readImage(settings.detail, progress);
+    auto detail = readMapAs(settings.detail, {settings.encoding, Green::Up}, settings.encoding, progress);
     if (!detail) return detail.error();
-    set.detail_ = std::move(detail->image);
+    set.detail_ = std::move(*detail);
   }
   const std::span<const Vec3> basis = rnm ? std::span<const Vec3>(kRnmBasis) : std::span<const Vec3>(settings.basis);
   for (const Vec3& axis : basis) set.lobes_.push_back({axis, settings.lobe, settings.coneOpeningDegrees});
@@ -95,7 +96,7 @@ Expected<MapSet> MapSet::open(const MapSettings& settings, int width, int height
     auto names = channels == 1 ? std::vector<std::string>{"Y"} : channelNames(channels, withAlpha);
     auto own = metadata;
     own["lumel:content"] = content;
-    auto opened = MapWriter::open(file, width, height, static_cast<int>(channels) + (withAlpha ? 1 : 0), kind,
+    auto opened = MapWriter::open(set.files_, file, width, height, static_cast<int>(channels) + (withAlpha ? 1 : 0), kind,
                                   settings.options, std::move(names), std::move(own));
     if (!opened) return opened.error();
     writer.emplace(std::move(*opened));
@@ -206,11 +207,10 @@ Expected<void> MapSet::write(const Image& normals, const Image& occlusion, const
 
 Expected<void> MapSet::commit(const Progress& progress) {
   LUMEL_CHECK(row_ == height_);
-  std::vector<PendingFile> files;
   for (auto* writer : {&weights_, &occlusion_, &ambient_, &normal_, &recovered_, &ssbump_})
     if (*writer)
-      if (auto done = (*writer)->finish(files, progress); !done) return done;
-  return putInPlace(files);
+      if (auto done = (*writer)->finish(files_, progress); !done) return done;
+  return files_.commit();
 }
 
 std::vector<std::string> MapSet::warnings() const {

@@ -32,7 +32,7 @@ struct MapSettings {
   float coneOpeningDegrees = 120;
   std::filesystem::path albedo;  // sRGB unless a float file; its luminance multiplies the ssbump map
   std::filesystem::path mask;    // first channel goes to the ssbump map's alpha, untouched
-  std::filesystem::path detail;  // an ssbump map in the same encoding, blended in evenly
+  std::filesystem::path detail;  // an ssbump map (as its metadata say, else in the same encoding), blended in evenly
   float detailRepeats = 1;
 };
 
@@ -60,6 +60,7 @@ class MapSet {
   void modulate(Image& rows) const;
   void addAlpha(Image& rows) const;
 
+  FileSet files_;
   MapSettings settings_;
   int width_ = 0, height_ = 0, row_ = 0;
   std::vector<Lobe> lobes_;

@@ -57,32 +57,29 @@ std::filesystem::path mipName(const std::filesystem::path& file, std::size_t lev
 
 }  // namespace
 
-Expected<MapWriter> MapWriter::open(const std::filesystem::path& file, int width, int height, int channels,
-                                    MapKind kind, const MapOptions& options, std::vector<std::string> channelNames,
+Expected<MapWriter> MapWriter::open(FileSet& files, const std::filesystem::path& file, int width, int height,
+                                    int channels, MapKind kind, const MapOptions& options,
+                                    std::vector<std::string> channelNames,
                                     std::map<std::string, std::string> metadata) {
   const std::string extension = extensionOf(file);
   MapWriter writer;
-  writer.file_ = file;
   writer.width_ = width;
   writer.height_ = height;
   writer.channels_ = channels;
   writer.kind_ = kind;
   writer.options_ = options;
   writer.write_ = {formatFor(extension, options), std::move(channelNames), std::move(metadata)};
+  if (auto good = checkFormat(file, extension, channels, writer.write_.format); !good) return good.error();
+  auto pending = files.add(file);
+  if (!pending) return pending.error();
+  writer.file_ = std::move(*pending);
   if (extension == ".dds") {
-    if (channels > 4)
-      return usageError(file.string() + ": " + std::to_string(channels) + " channels need .exr or .tif");
-    std::error_code ec;
-    const auto folder = file.parent_path().empty() ? std::filesystem::path(".") : file.parent_path();
-    if (!std::filesystem::is_directory(folder, ec))
-      return failure(file.string() + ": cannot be written: no such folder");
     writer.options_.mips = true;
-  } else {
-    if (auto good = checkFormat(file, extension, channels, writer.write_.format); !good) return good.error();
-    auto stream = ImageWriter::open(file, width, height, channels, writer.write_);
-    if (!stream) return stream.error();
-    writer.stream_.emplace(std::move(*stream));
+    return writer;
   }
+  auto stream = ImageWriter::open(writer.file_, width, height, channels, writer.write_);
+  if (!stream) return stream.error();
+  writer.stream_.emplace(std::move(*stream));
   return writer;
 }
 
@@ -105,38 +102,30 @@ Expected<void> MapWriter::write(const Image& rows, const Progress& progress) {
   return stream_ ? stream_->write(rows, progress) : Expected<void>();
 }
 
-Expected<PendingFile> MapWriter::finishDds(const Progress& progress) {
+Expected<void> MapWriter::finishDds(const Progress& progress) {
   std::vector<Image> levels = mipLevels(kept_, options_.mipFilter, options_.wrap, progress);
   if (progress.cancelled()) return interrupted();
   levels.insert(levels.begin(), std::move(kept_));
   if (kind_ == MapKind::Normals)
     for (std::size_t i = 1; i < levels.size(); ++i) makeUnit(levels[i]);
   const auto note = write_.metadata.find("ImageDescription");
-  return writeDds(file_, levels, ddsFormatFor(options_), note == write_.metadata.end() ? "" : note->second,
-                  progress);
+  return writeDds(file_, levels, ddsFormatFor(options_), note == write_.metadata.end() ? "" : note->second, progress);
 }
 
-Expected<void> MapWriter::finish(std::vector<PendingFile>& files, const Progress& progress) {
-  const auto keep = [&](Expected<PendingFile> file) -> Expected<void> {
-    if (!file) return file.error();
-    files.push_back(std::move(*file));
-    return {};
-  };
-  if (!stream_) return keep(finishDds(progress));
+Expected<void> MapWriter::finish(FileSet& files, const Progress& progress) {
+  if (!stream_) return finishDds(progress);
   if (options_.mips && (width_ > 1 || height_ > 1)) {
     std::vector<Image> levels = mipLevels(kept_, options_.mipFilter, options_.wrap, progress);
     if (progress.cancelled()) return interrupted();
     if (halvesAsItGoes()) levels.insert(levels.begin(), std::move(kept_));
     for (std::size_t i = 0; i < levels.size(); ++i) {
-      Image& level = levels[i];
-      if (kind_ == MapKind::Normals) makeUnit(level);
-      auto writer = ImageWriter::open(mipName(file_, i + 1), level.width, level.height, level.channels, write_);
-      if (!writer) return writer.error();
-      if (auto done = writer->write(level, progress); !done) return done;
-      if (auto done = keep(writer->finish()); !done) return done;
+      if (kind_ == MapKind::Normals) makeUnit(levels[i]);
+      auto file = files.add(mipName(file_.place, i + 1));
+      if (!file) return file.error();
+      if (auto done = writeImage(*file, levels[i], write_, progress); !done) return done;
     }
   }
-  return keep(stream_->finish());
+  return stream_->finish();
 }
 
 }  // namespace lumel::ssbump

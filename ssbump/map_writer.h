@@ -28,25 +28,26 @@ struct MapOptions {
 /// Interrupted.
 class MapWriter {
  public:
-  static Expected<MapWriter> open(const std::filesystem::path& file, int width, int height, int channels, MapKind kind,
+  /// The files join `files`, which puts them in place.
+  static Expected<MapWriter> open(FileSet& files, const std::filesystem::path& file, int width, int height, int channels, MapKind kind,
                                   const MapOptions& options, std::vector<std::string> channelNames,
                                   std::map<std::string, std::string> metadata);
 
   /// The next rows from the top. Memory: a plain map holds no rows; with mips a quarter of the map (box filter, even
   /// sides) or all of it; DDS all of it.
   Expected<void> write(const Image& rows, const Progress& progress);
-  /// Completes the map's files under their temporary names, and adds them to those to be put in place together.
-  Expected<void> finish(std::vector<PendingFile>& files, const Progress& progress);
+  /// Completes the map's files.
+  Expected<void> finish(FileSet& files, const Progress& progress);
 
   /// Values above 1 or below 0 that an integer format has cut.
   std::size_t clipped() const { return clipped_; }
-  const std::filesystem::path& file() const { return file_; }
+  const std::filesystem::path& file() const { return file_.place; }
 
  private:
   bool halvesAsItGoes() const;
-  Expected<PendingFile> finishDds(const Progress& progress);
+  Expected<void> finishDds(const Progress& progress);
 
-  std::filesystem::path file_;
+  PendingFile file_;
   int width_ = 0, height_ = 0, channels_ = 0, row_ = 0;
   MapKind kind_ = MapKind::Weights;
   MapOptions options_;

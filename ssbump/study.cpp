@@ -1,15 +1,11 @@
 #include "ssbump/study.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <functional>
 #include <numeric>
-#include <system_error>
 
 #include "scene/image_io.h"
 #include "ssbump/block_compression.h"
@@ -200,20 +196,6 @@ Image studyPicture(const Image& map, const Progress& progress) {
   return panelGrid(panels, 4);
 }
 
-/// Small text files follow the same rule as images: complete or absent.
-Expected<void> writeText(const std::filesystem::path& file, const std::string& text) {
-  const auto temporary =
-      file.parent_path() / ("." + file.filename().string() + "." + std::to_string(getpid()) + ".part");
-  std::ofstream out(temporary, std::ios::binary);
-  out << text;
-  out.close();
-  std::error_code ec;
-  if (out) std::filesystem::rename(temporary, file, ec);
-  if (out && !ec) return {};
-  std::filesystem::remove(temporary, ec);
-  return failure(file.string() + ": cannot be written");
-}
-
 }  // namespace
 
 std::vector<StudyRow> studyFormats(const Image& map, int lastMip, Progress& progress) {
@@ -277,12 +259,16 @@ Expected<void> writeStudy(const Image& map, const std::string& title, const std:
   const std::string text = table(studyFormats(map, 3, progress), studyMips(map, 6, progress), title);
   const Image picture = studyPicture(map, progress);
   if (progress.cancelled()) return interrupted();
-  std::error_code ec;
-  std::filesystem::create_directories(folder, ec);
-  if (ec) return failure(folder.string() + ": cannot be made: " + ec.message());
-  if (auto done = writeText(folder / "study.md", text); !done) return done;
-  return writeImage(folder / "study.png", picture,
-                    {.format = PixelFormat::U8, .channelNames = {}, .metadata = {}});
+  auto files = FileSet::forFolder(folder);
+  if (!files) return files.error();
+  const auto pictureFile = files->add(folder / "study.png");
+  if (!pictureFile) return pictureFile.error();
+  const WriteImageOptions options{.format = PixelFormat::U8, .channelNames = {}, .metadata = {}};
+  if (auto done = writeImage(*pictureFile, picture, options, progress); !done) return done;
+  const auto textFile = files->add(folder / "study.md");
+  if (!textFile) return textFile.error();
+  if (auto done = writeBytes(*textFile, text.data(), text.size()); !done) return done;
+  return files->commitFolder({});
 }
 
 }  // namespace lumel::ssbump

@@ -1,5 +1,4 @@
 #include "baker/bake_files.h"
-#include "baker/staging.h"
 
 #include <gtest/gtest.h>
 
@@ -7,6 +6,7 @@
 #include <set>
 
 #include "baker/baked_scene.h"
+#include "scene/file_set.h"
 
 namespace lumel {
 namespace {
@@ -90,7 +90,7 @@ TEST(BakeFiles, PutsBackWhatABakeKilledBetweenItsRenamesWasReplacing) {
   const fs::path dir = scratch();
   ASSERT_TRUE(Fixture(1, 0.25f).write(dir));
   const auto names = namesIn(dir);
-  // As such a bake leaves it: the old files in its staging folder, new ones half in place.
+  // As such a bake leaves it: the old files in its hidden folder, new ones half in place.
   const fs::path old = dir / ".lumel-999999999.part" / "old";
   const fs::path oldLast = dir / ".lumel-999999999.part" / "old-last";
   fs::create_directories(old);
@@ -98,7 +98,7 @@ TEST(BakeFiles, PutsBackWhatABakeKilledBetweenItsRenamesWasReplacing) {
   for (const std::string& name : names) fs::rename(dir / name, (name == "bake.json" ? oldLast : old) / name);
   std::ofstream(dir / "lightmap-0-flat.exr") << "new";
   EXPECT_FALSE(readBake(dir)) << "no mixture is taken for a bake";
-  Staging::recover(dir);
+  FileSet::recover(dir);
   EXPECT_EQ(namesIn(dir), names);
   const auto baked = readBake(dir);
   ASSERT_TRUE(baked) << baked.error().message;
@@ -106,7 +106,7 @@ TEST(BakeFiles, PutsBackWhatABakeKilledBetweenItsRenamesWasReplacing) {
   // With the new bake.json in place the new bake is whole, and what it replaced may go.
   fs::create_directories(oldLast);
   std::ofstream(oldLast / "bake.json") << "old";
-  Staging::recover(dir);
+  FileSet::recover(dir);
   EXPECT_EQ(namesIn(dir), names);
   EXPECT_TRUE(readBake(dir));
 }

@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <pty.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -23,6 +24,11 @@ using Clock = std::chrono::steady_clock;
 
 [[noreturn]] void becomeLumel(const std::vector<std::string>& arguments, const Surroundings& surroundings) {
   if (!surroundings.folder.empty() && chdir(surroundings.folder.c_str()) != 0) _exit(126);
+  if (surroundings.fileSizeLimit > 0) {
+    const rlimit limit{surroundings.fileSizeLimit, surroundings.fileSizeLimit};
+    signal(SIGXFSZ, SIG_IGN);  // or it would end the program
+    if (setrlimit(RLIMIT_FSIZE, &limit) != 0) _exit(126);
+  }
   std::vector<char*> argv{const_cast<char*>(LUMEL_BINARY)};
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);

@@ -1,6 +1,7 @@
 // Runs the lumel binary as a user would, and makes small scenes for it.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -21,7 +22,8 @@ struct Outcome {
 
 /// What a process starts with.
 struct Surroundings {
-  std::filesystem::path folder;  // empty: the test's own
+  std::filesystem::path folder;    // empty: the test's own
+  std::size_t fileSizeLimit = 0;   // bytes at which a write to any file fails, as on a full disk; 0: none
 };
 
 /// Runs `lumel ARGUMENTS...` with both outputs in pipes.

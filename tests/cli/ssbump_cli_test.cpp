@@ -91,8 +91,17 @@ TEST_F(SsbumpCli, ConvertsThereAndBack) {
   for (std::size_t i = 0; i < a.pixels.size(); ++i) ASSERT_NEAR(a.pixels[i], b.pixels[i], 1e-5);
   ASSERT_EQ(lumel("s.exr --convert --to normal -o n.png -q").code, 0);
   ASSERT_EQ(lumel("n.png --convert --from normal --to mod2x -o m.png -q").code, 0);
-  ASSERT_EQ(lumel("s.exr --cross-fade b.exr --amount 0.5 -o f.exr -q").code, 0);
-  EXPECT_TRUE(exists("f.exr"));
+  // The second map names its own form: a map faded with itself in another form is itself.
+  ASSERT_EQ(lumel("s.exr --cross-fade l.exr --amount 0.5 -o f.exr --bits float -q").code, 0);
+  const Image f = read("f.exr");
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) ASSERT_NEAR(a.pixels[i], f.pixels[i], 1e-5);
+  // So does a detail map: in either form it blends the same.
+  ASSERT_EQ(lumel("h.png -o d.exr --height-scale 8 --detail s.exr --detail-repeats 2 --bits float -q").code, 0);
+  ASSERT_EQ(lumel("h.png -o e.exr --height-scale 8 --detail b.exr --detail-repeats 2 --bits float -q").code, 0);
+  ASSERT_EQ(lumel("h.png -o g.exr --height-scale 8 --detail l.exr --detail-repeats 2 --bits float -q").code, 0);
+  const Image d = read("d.exr"), e = read("e.exr"), g = read("g.exr");
+  for (std::size_t i = 0; i < d.pixels.size(); ++i) ASSERT_NEAR(d.pixels[i], e.pixels[i], 1e-5);
+  for (std::size_t i = 0; i < d.pixels.size(); ++i) ASSERT_NEAR(d.pixels[i], g.pixels[i], 1e-5);
 }
 
 TEST_F(SsbumpCli, TheCommandLineIsChecked) {
@@ -100,7 +109,12 @@ TEST_F(SsbumpCli, TheCommandLineIsChecked) {
        {"", "h.png", "h.png -o s.png --method guess", "h.png -o s.png --rays 0", "h.png -o s.png --azimuths -1",
         "h.png -o s.png --height-scale tall", "h.png -o s.png --convention cubed", "h.png -o s.jpeg2 ",
         "h.png -o s.png --bits half", "h.png -o s.png --cone-angle 400", "h.png -o s.png --unknown",
-        "h.png -o s.png --low x.obj"}) {
+        "h.png -o s.png --low x.obj", "h.png -o s", "h.png -o s.png --save-ao ./s.png",
+        // Options that would change nothing.
+        "h.png -o s.png --width 64", "h.png -o s.png --rays 10", "h.png -o s.png --method rays --azimuths 8",
+        "h.png -o s.png --blocks bc1", "h.png -o s.png --to linear", "h.png -o s.png --cone-angle 60",
+        "s.png --convert -o n.png --save-ao ao.png", "s.png --convert --convention linear -o n.png",
+        "tile.obj -o s.png --invert", "tile.obj -o s.png --tile-width 2", "tile.obj -o s.png --study study"}) {
     const Ran ran = lumel(wrong);
     EXPECT_EQ(ran.code, 2) << wrong << "\n" << ran.output;
     EXPECT_NE(ran.output.find("lumel"), std::string::npos) << wrong;
@@ -121,7 +135,7 @@ TEST_F(SsbumpCli, BadInputIsNamedAndLeavesNothing) {
   const std::size_t before = files();
   for (const char* wrong :
        {"absent.png", "empty.png", "text.png", "inf.exr", "h.png --channel Z", "h.png --height-scale 1e9", "n.png",
-        "h.png --normal-map h.png", "h.png --mask one.png", "h.png --basis text.png", "h.png --albedo absent.png"}) {
+        "h.png --normal-map h.png", "h.png --mask one.png", "h.png --basis text.png", "h.png --albedo absent.png", "h.png --detail h.png"}) {
     const Ran ran = lumel(std::string(wrong) + " -o s.png -q");
     EXPECT_EQ(ran.code, 3) << wrong << "\n" << ran.output;
     EXPECT_EQ(std::count(ran.output.begin(), ran.output.end(), '\n'), 1) << wrong << "\n" << ran.output;

@@ -14,7 +14,7 @@ TEST(StudyCommand, WritesTablesAndPlots) {
   ASSERT_EQ(outcome.exitCode, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("| gather | 16 (draft) |"), std::string::npos) << outcome.out;
   const auto files = readFolder(out);
-  ASSERT_EQ(files.size(), 6u);  // no staging folder is left
+  ASSERT_EQ(files.size(), 6u);  // no hidden folder is left
   EXPECT_EQ(files.at("study.md"), outcome.out);
   const auto json = readJson(out / "study.json");
   EXPECT_EQ(json["reference"]["samplesOfAHalf"], 128);

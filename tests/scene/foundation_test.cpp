@@ -2,6 +2,8 @@
 
 #include <atomic>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 
 #include "scene/expected.h"
 #include "scene/image_io.h"
@@ -82,24 +84,28 @@ TEST(ImageIo, PartsMakeTheSameFileAndAnUnfinishedOneLeavesNothing) {
   for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = static_cast<float>(i) / 128;
   fs::remove_all(scratch("").parent_path());  // what an earlier run has left
   const fs::path whole = scratch("whole.png"), parts = scratch("parts.png");
-  ASSERT_TRUE(writeImage(whole, image, {.format = PixelFormat::U16, .channelNames = {}, .metadata = {}}));
+  const WriteImageOptions options{.format = PixelFormat::U16, .channelNames = {}, .metadata = {}};
+  ASSERT_TRUE(writeImage(whole, image, options));
   const auto rows = [&](int first, int count) {
     Image part(5, count, 3);
     std::copy_n(image.at(0, first), part.pixels.size(), part.pixels.begin());
     return part;
   };
   {
-    auto writer = ImageWriter::open(parts, 5, 7, 3, {.format = PixelFormat::U16, .channelNames = {}, .metadata = {}});
+    FileSet set;
+    auto writer = ImageWriter::open(*set.add(parts), 5, 7, 3, options);
     ASSERT_TRUE(writer);
     ASSERT_TRUE(writer->write(rows(0, 3)));
   }
   EXPECT_EQ(std::distance(fs::directory_iterator(parts.parent_path()), {}), 1) << "only the whole file";
-  auto writer = ImageWriter::open(parts, 5, 7, 3, {.format = PixelFormat::U16, .channelNames = {}, .metadata = {}});
+  FileSet set;
+  auto writer = ImageWriter::open(*set.add(parts), 5, 7, 3, options);
   ASSERT_TRUE(writer);
   ASSERT_TRUE(writer->write(rows(0, 3)));
   ASSERT_TRUE(writer->write(rows(3, 4)));
+  ASSERT_TRUE(writer->finish());
   EXPECT_FALSE(fs::exists(parts));
-  ASSERT_TRUE(writer->commit());
+  ASSERT_TRUE(set.commit());
   EXPECT_EQ(readImage(parts)->image.pixels, readImage(whole)->image.pixels);
 }
 
@@ -128,15 +134,43 @@ TEST(ImageIo, HalfOverflowAndNanFailLoudlyAndLeaveNoFile) {
   EXPECT_FALSE(fs::exists(file));
 }
 
-TEST(ImageIo, MissingTruncatedAndUnwritableFilesAreErrors) {
+TEST(ImageIo, MissingAndUnwritableFilesAreErrors) {
   EXPECT_EQ(readImage("/nonexistent/x.png").error().kind, ErrorKind::Input);
-  Image image(64, 64, 3, 0.5f);
-  auto png = encodePng(image);
-  ASSERT_TRUE(png);
-  auto cut = readImage(std::span(*png).first(png->size() / 2), "cut");
-  ASSERT_FALSE(cut);
-  EXPECT_EQ(cut.error().kind, ErrorKind::Input);
-  EXPECT_EQ(writeImage("/nonexistent/x.exr", image).error().kind, ErrorKind::Failed);
+  EXPECT_EQ(writeImage("/nonexistent/x.exr", Image(2, 2, 3)).error().kind, ErrorKind::Failed);
+}
+
+// Whole, a file is read; cut anywhere before its last pixels, it is an error of one line that names it: also where the
+// decoder would fill in the rest (JPEG, TIFF), and from memory as textures come.
+TEST(ImageIo, CutOffFilesOfAnyFormatAreErrors) {
+  Image image(64, 64, 3);
+  std::uint32_t state = 1;  // noise: every row takes its share of the file
+  for (float& v : image.pixels) v = static_cast<float>((state = state * 1664525 + 1013904223) >> 24) / 255.0f;
+  for (const char* name : {"cut.png", "cut.jpg", "cut.tga", "cut.tif", "cut.exr", "cut.hdr", "cut.bmp", "cut.webp"}) {
+    const fs::path file = scratch(name);
+    const bool isFloat = file.extension() == ".exr" || file.extension() == ".hdr";
+    ASSERT_TRUE(writeImage(file, image,
+                           {.format = isFloat ? PixelFormat::Float : PixelFormat::U8, .channelNames = {}, .metadata = {}}))
+        << name;
+    std::vector<std::uint8_t> bytes;
+    {
+      std::ifstream in(file, std::ios::binary);
+      bytes.assign(std::istreambuf_iterator<char>(in), {});
+    }
+    ASSERT_TRUE(readImage(file)) << name;
+    ASSERT_TRUE(readImage(bytes, "memory")) << name;
+    // What follows the pixels may be missing in a TGA (a footer of 26 bytes and more) and a TIFF (its directory).
+    for (const std::size_t length : {std::size_t{20}, bytes.size() / 10, bytes.size() / 2, bytes.size() * 9 / 10}) {
+      fs::resize_file(file, length);
+      for (const auto& cut : {readImage(file), readImage(std::span(bytes).first(length), "memory")}) {
+        ASSERT_FALSE(cut) << name << " cut to " << length << " of " << bytes.size();
+        EXPECT_EQ(cut.error().kind, ErrorKind::Input);
+        EXPECT_EQ(cut.error().message.find('\n'), std::string::npos) << cut.error().message;
+      }
+      EXPECT_NE(readImage(file).error().message.find(file.string()), std::string::npos);
+      std::ofstream(file, std::ios::binary)
+          .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    }
+  }
 }
 
 }  // namespace
