@@ -95,9 +95,9 @@ Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasRes
     if (auto done = writeImage(staging->file("sky.exr"), scene.environment.image); !done) return done;
   const auto glb = encodeGlb(scene, atlas.atlas);
   if (!glb) return glb.error();
-  if (auto done = writeBytes(staging->file("scene.glb"), glb->data(), glb->size()); !done) return done;
+  if (auto done = writeBytes(staging->file("scene.glb"), *glb); !done) return done;
   const std::string json = describeBake(scene, atlas, result, record);
-  if (auto done = writeBytes(staging->file("bake.json"), json.data(), json.size()); !done) return done;
+  if (auto done = writeBytes(staging->file("bake.json"), json); !done) return done;
   return staging->commit([](const std::string& name) { return isPageImage(name) || name == "sky.exr"; });
 }
 

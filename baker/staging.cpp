@@ -135,9 +135,15 @@ Expected<void> Staging::exchange(const std::function<bool(const std::string& nam
   return {};
 }
 
-Expected<void> writeBytes(const fs::path& file, const void* data, std::size_t size) {
+Expected<void> writeBytes(const fs::path& file, std::string_view bytes) {
+  const std::vector<std::uint8_t> piece(bytes.begin(), bytes.end());
+  return writeBytes(file, {&piece, 1});
+}
+
+Expected<void> writeBytes(const fs::path& file, std::span<const std::vector<std::uint8_t>> pieces) {
   std::ofstream out(file, std::ios::binary | std::ios::trunc);
-  out.write(static_cast<const char*>(data), static_cast<std::streamsize>(size));
+  for (const std::vector<std::uint8_t>& piece : pieces)
+    out.write(reinterpret_cast<const char*>(piece.data()), static_cast<std::streamsize>(piece.size()));
   out.close();
   if (!out) return cannotWrite(file, std::strerror(errno));
   return {};
@@ -152,7 +158,7 @@ Expected<void> checkWritable(const fs::path& dir) {
   fs::create_directories(dir, ec);
   if (ec || !fs::is_directory(dir)) return cannotWrite(dir, ec ? ec.message() : "not a folder");
   const fs::path probe = dir / (kStagingPrefix + std::to_string(getpid()) + ".probe");
-  auto written = writeBytes(probe, "", 0);
+  auto written = writeBytes(probe, std::string_view());
   fs::remove(probe, ec);
   if (!made.empty()) fs::remove_all(made, ec);
   if (!written) return cannotWrite(dir, "no file can be made in it");

@@ -1,9 +1,12 @@
 // Results of several files, made whole in a hidden folder before any of them is seen.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "scene/expected.h"
@@ -53,7 +56,9 @@ class Staging {
 };
 
 /// Errors: Failed.
-Expected<void> writeBytes(const std::filesystem::path& file, const void* data, std::size_t size);
+Expected<void> writeBytes(const std::filesystem::path& file, std::string_view bytes);
+/// The pieces one after the other.
+Expected<void> writeBytes(const std::filesystem::path& file, std::span<const std::vector<std::uint8_t>> pieces);
 
 /// Finds out before the long work whether `dir` can be written: makes it and a file in it, and removes what it made.
 /// Errors: Failed, naming the folder.

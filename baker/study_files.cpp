@@ -178,7 +178,7 @@ Expected<void> writeStudy(const fs::path& dir, const Study& study, const std::st
   auto staging = Staging::make(dir);
   if (!staging) return staging.error();
   const auto write = [&](const std::string& name, const std::string& text) {
-    return writeBytes(staging->file(name), text.data(), text.size());
+    return writeBytes(staging->file(name), text);
   };
   const Plot rays = errorPlot(study, "Error against rays: " + scene, "rays per texel, all kinds", raysPerTexel);
   const Plot time =
