@@ -7,6 +7,7 @@
 #include <atomic>
 #include <chrono>
 #include <limits>
+#include <optional>
 #include <span>
 
 #include "baker/doubling_error.h"
@@ -62,31 +63,17 @@ struct WaveStats {
   std::size_t residuals = 0;
 };
 
-BakedTexel bakedTexel(const TexelResult& texel) {
-  BakedTexel baked{.value = texel.sums.mean(),
-                   .coverage = texel.coverage,
-                   .validity = texel.sums.validity(),
-                   .samples = texel.sums.count(),
-                   .probed = texel.probed && texel.sums.count() > 0};
-  if (baked.probed)
-    for (std::size_t i = 0; i < kProbeNormals; ++i)
-      baked.probes[i] = Vec3(texel.probes[i] / static_cast<double>(baked.samples));
-  return baked;
-}
-
-void storeTexel(BakedPage& page, TexelCoord at, const BakedTexel& texel, Projection projection, WaveStats& stats) {
-  if (!(texel.coverage > 0.0f)) return;
-  const std::array<Vec3, 3> rnm = finishTexel(projection, texel.value.rnm, texel.value.flat);
-  for (std::size_t i = 0; i < 3; ++i) page.rnm[i].setRgb(at.x, at.y, rnm[i]);
-  page.flat.setRgb(at.x, at.y, texel.value.flat);
-  float* aux = page.aux.at(at.x, at.y);
-  aux[0] = texel.coverage;
-  aux[1] = texel.validity;
-  aux[2] = texel.standardError;
-  aux[3] = static_cast<float>(texel.samples);
+/// Enters a texel's aux pixel and figures; `rnm` as stored.
+void storeAux(Image& aux, TexelCoord at, const BakedTexel& texel, const Vec3& flat, const std::array<Vec3, 3>& rnm,
+              WaveStats& stats) {
+  float* pixel = aux.at(at.x, at.y);
+  pixel[0] = texel.coverage;
+  pixel[1] = texel.validity;
+  pixel[2] = texel.standardError;
+  pixel[3] = static_cast<float>(texel.samples);
   if (texel.validity < 0.5f) return;
   ++stats.validTexels;
-  stats.luminance += static_cast<double>(luminance(texel.value.flat));
+  stats.luminance += static_cast<double>(luminance(flat));
   stats.standardError += static_cast<double>(texel.standardError);
   if (!texel.probed) return;
   for (std::size_t i = 0; i < kProbeNormals; ++i) {
@@ -95,6 +82,23 @@ void storeTexel(BakedPage& page, TexelCoord at, const BakedTexel& texel, Project
     stats.residualSquares += difference * difference;
     ++stats.residuals;
   }
+}
+
+/// Of path tracing.
+void storeTexel(BakedPage& page, TexelCoord at, const TexelResult& texel, Projection projection, WaveStats& stats) {
+  if (!(texel.coverage > 0.0f)) return;
+  BakedTexel baked{.coverage = texel.coverage,
+                   .validity = texel.sums.validity(),
+                   .samples = texel.sums.count(),
+                   .probed = texel.probed && texel.sums.count() > 0};
+  if (baked.probed)
+    for (std::size_t i = 0; i < kProbeNormals; ++i)
+      baked.probes[i] = Vec3(texel.probes[i] / static_cast<double>(baked.samples));
+  const SampleValue value = texel.sums.mean();
+  const std::array<Vec3, 3> rnm = finishTexel(projection, value.rnm, value.flat);
+  for (std::size_t i = 0; i < 3; ++i) page.rnm[i].setRgb(at.x, at.y, rnm[i]);
+  page.flat.setRgb(at.x, at.y, value.flat);
+  storeAux(page.aux, at, baked, value.flat, rnm, stats);
 }
 
 BakeStats sumUp(std::span<const WaveStats> waves, std::uint64_t seed) {
@@ -130,43 +134,78 @@ BakeStats sumUp(std::span<const WaveStats> waves, std::uint64_t seed) {
   return total;
 }
 
-std::vector<BakedPage> emptyPages(const Atlas& atlas) {
-  std::vector<BakedPage> pages(atlas.pages.size());
-  for (std::size_t i = 0; i < pages.size(); ++i) {
-    const Page& page = atlas.pages[i];
-    for (Image* image : {&pages[i].rnm[0], &pages[i].rnm[1], &pages[i].rnm[2], &pages[i].flat})
-      *image = Image(page.width, page.height, 3);
-    pages[i].aux = Image(page.width, page.height, 4);
+Image pageImage(const Atlas& atlas, std::size_t page, int channels) {
+  return Image(atlas.pages[page].width, atlas.pages[page].height, channels);
+}
+
+constexpr std::size_t kTexelGrain = 1024;
+
+/// Finishes the light of a page's texels [first, last) and stores all but the maps.
+void finishTexels(const GatherIntegrator& integrator, std::uint32_t page, const PageTexels& texels, std::size_t first,
+                  std::size_t last, Projection projection, TexelLight& light, Image& aux, WaveStats& stats) {
+  for (std::size_t i = first; i < last; ++i) {
+    const BakedTexel texel = integrator.texel(page, i);
+    if (!(texel.coverage > 0.0f)) continue;
+    const std::size_t t = integrator.firstOfPage(page) + i;
+    std::array<Vec3, 3> rnm = {light.rnm[0][t], light.rnm[1][t], light.rnm[2][t]};
+    rnm = finishTexel(projection, rnm, light.flat[t]);
+    for (std::size_t k = 0; k < 3; ++k) light.rnm[k][t] = rnm[k];
+    storeAux(aux, texels.coords[i], texel, light.flat[t], rnm, stats);
   }
-  return pages;
+}
+
+/// The pages' images of one map; its texels are freed.
+std::vector<Image> takeMap(std::vector<Vec3>& map, const Atlas& atlas, const std::vector<PageTexels>& texels) {
+  std::vector<Image> images;
+  std::size_t before = 0;
+  for (std::size_t p = 0; p < texels.size(); ++p) {
+    Image& image = images.emplace_back(pageImage(atlas, p, 3));
+    const std::vector<TexelCoord>& coords = texels[p].coords;
+    parallelFor(coords.size(), kTexelGrain, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) image.setRgb(coords[i].x, coords[i].y, map[before + i]);
+    });
+    before += coords.size();
+  }
+  map = std::vector<Vec3>();
+  return images;
 }
 
 Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
                                         const std::vector<PageTexels>& texels, const BakeOptions& options,
                                         std::vector<BakedPage>& pages, Progress& progress) {
-  GatherIntegrator integrator(transport, kernels, atlas, texels,
-                              {.samples = std::max(1, options.samples),
-                               .maxSamples = options.maxSamples,
-                               .bounces = options.bounces,
-                               .seed = options.seed,
-                               .targetError = options.targetError,
-                               .timeBudgetSeconds = static_cast<double>(options.timeBudgetSeconds)});
-  if (auto done = integrator.run(progress); !done) return done.error();
-  pages = emptyPages(atlas);
-  const std::vector<Wave> waves = wavesOf(texels);
-  constexpr std::size_t kGrain = 64;  // waves that share their figures: one entry per wave would cost 7 bytes a texel
-  std::vector<WaveStats> waveStats(waves.size() / kGrain + 2);
-  parallelFor(waves.size(), kGrain, [&](std::size_t first, std::size_t last) {
-    for (std::size_t w = first; w < last; ++w)
-      for (std::size_t i = waves[w].first; i < waves[w].first + waves[w].count; ++i)
-        storeTexel(pages[waves[w].page], texels[waves[w].page].coords[i], integrator.texel(waves[w].page, i),
-                   options.projection, waveStats[first / kGrain]);
-  });
-  waveStats.back().rays = integrator.rays();
-  waveStats.back().shadowRays = integrator.shadowRays();
-  waveStats.back().nonFinite = integrator.nonFinite().size();
-  waveStats.back().firstNonFinite = integrator.nonFinite();
-  return waveStats;
+  const GatherOptions gatherOptions{.samples = std::max(1, options.samples),
+                                    .maxSamples = options.maxSamples,
+                                    .bounces = options.bounces,
+                                    .seed = options.seed,
+                                    .targetError = options.targetError,
+                                    .timeBudgetSeconds = static_cast<double>(options.timeBudgetSeconds)};
+  std::optional<GatherIntegrator> integrator(std::in_place, transport, kernels, atlas, texels, gatherOptions);
+  if (auto done = integrator->run(progress); !done) return done.error();
+  // Texels become pages map by map: the two together would be the peak of a bake's memory.
+  TexelLight light = integrator->takeLight();
+  pages.resize(atlas.pages.size());
+  std::vector<WaveStats> stats(1);
+  stats[0].rays = integrator->rays();
+  stats[0].shadowRays = integrator->shadowRays();
+  stats[0].nonFinite = integrator->nonFinite().size();
+  stats[0].firstNonFinite = integrator->nonFinite();
+  for (std::size_t p = 0; p < pages.size(); ++p) {
+    pages[p].aux = pageImage(atlas, p, 4);
+    const std::size_t before = stats.size();
+    stats.resize(before + (texels[p].size() + kTexelGrain - 1) / kTexelGrain);
+    parallelFor(texels[p].size(), kTexelGrain, [&](std::size_t first, std::size_t last) {
+      finishTexels(*integrator, static_cast<std::uint32_t>(p), texels[p], first, last, options.projection, light,
+                   pages[p].aux, stats[before + first / kTexelGrain]);
+    });
+  }
+  integrator.reset();
+  const auto take = [&](std::vector<Vec3>& map, auto imageOf) {
+    std::vector<Image> images = takeMap(map, atlas, texels);
+    for (std::size_t p = 0; p < pages.size(); ++p) imageOf(pages[p]) = std::move(images[p]);
+  };
+  for (std::size_t k = 0; k < 3; ++k) take(light.rnm[k], [k](BakedPage& page) -> Image& { return page.rnm[k]; });
+  take(light.flat, [](BakedPage& page) -> Image& { return page.flat; });
+  return stats;
 }
 
 /// Long paths gain little from their sequence, and tails are heavy: no credit is taken.
@@ -216,7 +255,12 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
                                   {.samples = std::max(1, options.samples),
                                    .bounces = options.bounces < 0 ? kLongestPath : options.bounces,
                                    .seed = options.seed});
-  pages = emptyPages(atlas);
+  pages.resize(atlas.pages.size());
+  for (std::size_t p = 0; p < pages.size(); ++p) {
+    for (Image* image : {&pages[p].rnm[0], &pages[p].rnm[1], &pages[p].rnm[2], &pages[p].flat})
+      *image = pageImage(atlas, p, 3);
+    pages[p].aux = pageImage(atlas, p, 4);
+  }
   const std::vector<Wave> waves = wavesOf(texels);
   std::vector<WaveStats> waveStats(waves.size());
   std::uint64_t texelCount = 0;
@@ -239,8 +283,7 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
       for (std::size_t m = 0; m < kMarks.size(); ++m)
         for (std::size_t i = 0; i < wave.count; ++i) means[w][m][i] = done.texels[i].sums.luminanceBefore(kMarks[m]);
       for (std::size_t i = 0; i < wave.count; ++i)
-        storeTexel(pages[wave.page], page.coords[wave.first + i], bakedTexel(done.texels[i]), options.projection,
-                   stats);
+        storeTexel(pages[wave.page], page.coords[wave.first + i], done.texels[i], options.projection, stats);
       progress.advance(wave.count);
     }
   });

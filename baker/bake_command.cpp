@@ -9,6 +9,7 @@
 #include "baker/conventions.h"
 #include "baker/earlier_layout.h"
 #include "baker/finish.h"
+#include "baker/process_memory.h"
 #include "baker/quality.h"
 #include "baker/scene_arguments.h"
 #include "baker/stage_clock.h"
@@ -180,6 +181,7 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   if (auto checked = check(a); !checked) return checked;
   FileSet::recover(a.output);
   if (auto writable = checkWritable(a.output); !writable) return writable;
+  keepLargeArraysApart();
   const ThreadLimit limit(a.threads);
   const int samples = samplesOf(a);
   context.settings["samples"] = samples;
@@ -201,8 +203,10 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   clock.start("atlas");
   const auto atlas = makeAtlas(*scene, a, context);
   if (!atlas) return atlas.error();
+  returnFreeMemory();
   clock.start("texels");
   const auto texels = findTexels(atlas->atlas);
+  returnFreeMemory();
   clock.start("bake");
   auto baked = bake(*scene, atlas->atlas, texels, record.bakeOptions, progress);
   if (!baked) return baked.error();

@@ -102,11 +102,11 @@ Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasRes
   const auto writeFile = [&](const char* name, const auto& bytes) -> Expected<void> {
     const auto file = set->add(dir / name);
     if (!file) return file.error();
-    return writeBytes(*file, bytes.data(), bytes.size());
+    return writeBytes(*file, bytes);
   };
   const auto glb = encodeGlb(scene, atlas.atlas);
   if (!glb) return glb.error();
-  if (auto done = writeFile("scene.glb", *glb); !done) return done;
+  if (auto done = writeFile("scene.glb", std::span<const std::vector<std::uint8_t>>(*glb)); !done) return done;
   if (auto done = writeFile("bake.json", describeBake(scene, atlas, result, record)); !done) return done;
   return set->commitFolder([](const std::string& name) { return isPageImage(name) || name == "sky.exr"; });
 }

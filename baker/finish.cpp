@@ -1,6 +1,7 @@
 #include "baker/finish.h"
 
 #include <algorithm>
+#include <span>
 
 #include "lightmap/denoise.h"
 #include "lightmap/dilate.h"
@@ -25,7 +26,6 @@ PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& t
   PageState state;
   state.covered = state.valid = {page.aux.width, page.aux.height, std::vector<std::uint8_t>(count, 0)};
   state.holes.assign(count, 0);
-  state.chartIds.assign(count, 0);
   for (std::size_t i = 0; i < count; ++i) {
     const float* aux = page.aux.pixels.data() + i * 4;
     if (!(aux[0] > 0.0f)) continue;
@@ -34,6 +34,7 @@ PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& t
   }
   state.hasHoles = std::find(state.holes.begin(), state.holes.end(), 1) != state.holes.end();
   if (!state.hasHoles && !needCharts) return state;
+  state.chartIds.assign(count, 0);
   for (std::size_t texel = 0; texel < texels.size(); ++texel) {
     const TexelCoord at = texels.coords[texel];
     const TriangleRef triangle = texels.trianglesOf(texel).front();
@@ -44,15 +45,10 @@ PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& t
 }
 
 void denoisePage(BakedPage& page, const PageState& state) {
-  const std::size_t count = state.chartIds.size();
-  std::vector<std::uint32_t> charts(count, 0);
-  std::vector<float> standardError(count, 0.0f);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (state.valid.known[i] == 0) continue;
-    charts[i] = state.chartIds[i];
-    standardError[i] = page.aux.pixels[i * 4 + 2];
-  }
-  denoise(page.flat, page.rnm, charts, standardError);
+  std::vector<std::uint32_t> charts = state.chartIds;
+  for (std::size_t i = 0; i < charts.size(); ++i)
+    if (state.valid.known[i] == 0) charts[i] = 0;
+  denoise(page.flat, page.rnm, charts, std::span(page.aux.pixels).subspan(2), 4);
 }
 
 }  // namespace

@@ -22,6 +22,7 @@ constexpr int kMostSweeps = 256;
 /// Longest path through surfaces without texels, where bounces have no end of their own.
 constexpr int kLongestPath = 64;
 constexpr std::size_t kSweepGrain = 4096;
+constexpr std::size_t kWaveGrain = kSweepGrain / kLanes;
 
 CacheLevels levelsFor(int bounces) {
   if (bounces < 0) return {.count = 1, .base = 0, .endless = true};
@@ -29,7 +30,22 @@ CacheLevels levelsFor(int bounces) {
   return {.count = count, .base = bounces - count, .endless = false};
 }
 
+/// Adds a wave's links to the table.
+void keepLinks(std::span<const CacheLink> found, std::span<std::uint32_t> texels,
+               std::vector<WarmLinks::Share>& shares) {
+  static const std::uint32_t whole = packWeight(Vec3(1.0f));
+  for (std::uint32_t i = 0; i < found.size(); ++i) {
+    texels[i] = found[i].texel;
+    if (found[i].texel != kNoTexel && found[i].weight != whole) shares.push_back({i, found[i].weight});
+  }
+}
+
 }  // namespace
+
+void TexelLight::resize(std::size_t count) {
+  flat.resize(count);
+  for (std::vector<Vec3>& map : rnm) map.resize(count);
+}
 
 GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
                                    const std::vector<PageTexels>& texels, const GatherOptions& options)
@@ -48,14 +64,6 @@ GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKer
                         static_cast<std::uint32_t>(std::min<std::size_t>(kLanes, texels[p].size() - first))});
   }
   scene_.strategies = lightStrategies(transport, true);
-  if (!scene_.strategies.empty()) spreads_.resize(waves_.size() * (scene_.strategies.size() + 1));
-  std::vector<std::uint32_t> lengths;
-  std::vector<std::uint32_t> pages;
-  for (const Wave& wave : waves_) {
-    lengths.push_back(wave.count);
-    pages.push_back(wave.page);
-  }
-  errors_.emplace(lengths, pages, kGatherCredit);
   std::size_t probes = 0;
   for (const PageTexels& page : texels) {
     firstProbe_.push_back(probes);
@@ -67,8 +75,9 @@ GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKer
 void GatherIntegrator::makeCache() {
   backFaces_.resize(map_.size());
   place_.resize(map_.size(), TexelPlace::Open);
+  if (scene_.levels.count == 0) return;
   reflectance_.resize(map_.size());
-  cache_.resize(map_.size() * stored());
+  if (!scene_.levels.endless) cache_.resize(map_.size() * stored());  // else it is what the warm-up ends with
 }
 
 /// After the warm-up, whose links are gone by then.
@@ -79,6 +88,14 @@ void GatherIntegrator::makeSums() {
   samplesOf_.resize(count);
   if (!scene_.levels.endless) levelSums_.resize(count * stored());
   probes_.resize(probeCount_);
+  if (!scene_.strategies.empty()) spreads_.resize(waves_.size() * (scene_.strategies.size() + 1));
+  std::vector<std::uint32_t> lengths;
+  std::vector<std::uint32_t> pages;
+  for (const Wave& wave : waves_) {
+    lengths.push_back(wave.count);
+    pages.push_back(wave.page);
+  }
+  errors_.emplace(lengths, pages, kGatherCredit);
 }
 
 /// What texel() does not need: its place is taken by the pages of the result.
@@ -86,6 +103,7 @@ void GatherIntegrator::dropCache() {
   reflectance_ = std::vector<Vec3>();  // `= {}` would keep the memory
   cache_ = std::vector<Vec3>();
   levelSums_ = std::vector<Vec3>();
+  spreads_ = std::vector<LightSpread>();
   substitutes_ = std::vector<TexelMap::Substitute>();
   map_.dropPixels();
 }
@@ -155,17 +173,21 @@ Expected<void> GatherIntegrator::run(Progress& progress) {
 
 Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   const std::size_t count = map_.size();
-  std::vector<CacheLink> links(count * GatherWave::kWarmRays);
+  WarmLinks links;
+  links.texels.resize(count * GatherWave::kWarmRays);
+  links.shares.resize(waves_.size());
   std::vector<Vec3> first(count);     // light that needs no texel to be known: direct, and what rays see shine
   std::vector<Vec3> constant(count);  // the same and light from hits without texels
   auto traced = forEachWave(progress, [&](std::size_t w) {
     const Wave& wave = waves_[w];
     const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
+    const std::size_t linkCount = std::size_t{wave.count} * GatherWave::kWarmRays;
     GatheredWave counts;
     GatherWave texels(scene_, wave.page, wave.first, wave.count);
-    const auto warm = texels.warmUp(
-        std::span(links).subspan(start * GatherWave::kWarmRays, std::size_t{wave.count} * GatherWave::kWarmRays),
-        counts);
+    std::array<CacheLink, std::size_t{kLanes} * GatherWave::kWarmRays> found;
+    const auto warm = texels.warmUp(std::span(found).first(linkCount), counts);
+    keepLinks(std::span(found).first(linkCount),
+              std::span(links.texels).subspan(start * GatherWave::kWarmRays, linkCount), links.shares[w]);
     for (std::size_t i = 0; i < wave.count; ++i) {
       reflectance_[start + i] = warm[i].reflectance;
       first[start + i] = warm[i].direct + warm[i].seen;
@@ -182,8 +204,7 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   return {};
 }
 
-void GatherIntegrator::solveLinks(std::span<const CacheLink> links, std::vector<Vec3> light,
-                                  std::span<const Vec3> constant) {
+void GatherIntegrator::solveLinks(const WarmLinks& links, std::vector<Vec3> light, std::span<const Vec3> constant) {
   const CacheLevels& levels = scene_.levels;
   const std::size_t count = map_.size();
   std::vector<Vec3> next(count);
@@ -195,21 +216,31 @@ void GatherIntegrator::solveLinks(std::span<const CacheLink> links, std::vector<
       cache_[t * stored() + static_cast<std::size_t>(level)] = reflectance_[t] * light[t];
   };
   substitute(light);
-  if (levels.base == 0) keep(0);
+  if (!levels.endless && levels.base == 0) keep(0);
   const int sweeps = levels.endless ? kMostSweeps : levels.base + levels.count - 1;
   double before = 0.0;
   for (int sweep = 1; sweep <= sweeps; ++sweep) {
-    std::vector<double> parts((count + kSweepGrain - 1) / kSweepGrain);
-    parallelFor(count, kSweepGrain, [&](std::size_t first, std::size_t last) {
+    std::vector<double> parts((waves_.size() + kWaveGrain - 1) / kWaveGrain);
+    parallelFor(waves_.size(), kWaveGrain, [&](std::size_t first, std::size_t last) {
       double sum = 0.0;
-      for (std::size_t t = first; t < last; ++t) {
-        Vec3 found(0.0f);
-        for (const CacheLink& link : links.subspan(t * GatherWave::kWarmRays, GatherWave::kWarmRays))
-          if (link.texel != kNoTexel) found += unpackWeight(link.weight) * reflectance_[link.texel] * light[link.texel];
-        next[t] = constant[t] + found / static_cast<float>(GatherWave::kWarmRays);
-        sum += static_cast<double>(luminance(next[t]));
+      for (std::size_t w = first; w < last; ++w) {
+        const std::size_t start = map_.firstOfPage(waves_[w].page) + waves_[w].first;
+        const std::uint32_t* link = links.texels.data() + start * GatherWave::kWarmRays;
+        auto share = links.shares[w].begin();
+        std::uint32_t index = 0;
+        for (std::size_t t = start; t < start + waves_[w].count; ++t) {
+          Vec3 found(0.0f);
+          for (int ray = 0; ray < GatherWave::kWarmRays; ++ray, ++index, ++link) {
+            if (*link == kNoTexel) continue;
+            Vec3 reflected = reflectance_[*link] * light[*link];
+            if (share != links.shares[w].end() && share->link == index) reflected *= unpackWeight(share++->weight);
+            found += reflected;
+          }
+          next[t] = constant[t] + found / static_cast<float>(GatherWave::kWarmRays);
+          sum += static_cast<double>(luminance(next[t]));
+        }
       }
-      parts[first / kSweepGrain] = sum;
+      parts[first / kWaveGrain] = sum;
     });
     std::swap(light, next);
     substitute(light);
@@ -219,7 +250,9 @@ void GatherIntegrator::solveLinks(std::span<const CacheLink> links, std::vector<
     if (levels.endless && total - before <= kSettled * total) break;
     before = total;
   }
-  if (levels.endless) keep(0);
+  if (!levels.endless) return;
+  for (std::size_t t = 0; t < count; ++t) light[t] *= reflectance_[t];
+  cache_ = std::move(light);
 }
 
 Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Progress& progress) {
@@ -247,11 +280,11 @@ void GatherIntegrator::store(std::size_t index, const GatheredWave& done, std::u
   const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
   for (std::size_t i = 0; i < wave.count; ++i) {
     const GatheredTexel& texel = done.texels[i];
-    Sums& sums = sums_[start + i];
-    before[i] = luminance(sums.flat) / static_cast<float>(std::max(1u, first));
-    sums.flat += Vec3(texel.flat);
-    now[i] = luminance(sums.flat) / static_cast<float>(end);
-    for (std::size_t k = 0; k < 3; ++k) sums.rnm[k] += Vec3(texel.rnm[k]);
+    Vec3& flat = sums_.flat[start + i];
+    before[i] = luminance(flat) / static_cast<float>(std::max(1u, first));
+    flat += Vec3(texel.flat);
+    now[i] = luminance(flat) / static_cast<float>(end);
+    for (std::size_t k = 0; k < 3; ++k) sums_.rnm[k][start + i] += Vec3(texel.rnm[k]);
     if (!scene_.levels.endless)
       for (std::size_t l = 0; l < stored(); ++l) levelSums_[(start + i) * stored() + l] += Vec3(texel.levels[l]);
     backFaces_[start + i] += place_[start + i] == TexelPlace::Buried ? end - first : texel.backFaces;
@@ -282,7 +315,7 @@ void GatherIntegrator::findBuried() {
 }
 
 Vec3 GatherIntegrator::lightOf(std::size_t texel, std::size_t level) const {
-  const Vec3& sum = scene_.levels.endless ? sums_[texel].flat : levelSums_[texel * stored() + level];
+  const Vec3& sum = scene_.levels.endless ? sums_.flat[texel] : levelSums_[texel * stored() + level];
   return sum / static_cast<float>(std::max(1u, weightOf(texel)));
 }
 
@@ -307,8 +340,9 @@ void GatherIntegrator::estimateErrors() {
 
 double GatherIntegrator::markDone() {
   double total = 0.0;
-  for (std::size_t t = 0; t < sums_.size(); ++t) total += static_cast<double>(luminance(sums_[t].flat)) / samplesOf_[t];
-  const double floor = kDarkFloor * total / static_cast<double>(std::max<std::size_t>(1, sums_.size()));
+  const std::size_t count = map_.size();
+  for (std::size_t t = 0; t < count; ++t) total += static_cast<double>(luminance(sums_.flat[t])) / samplesOf_[t];
+  const double floor = kDarkFloor * total / static_cast<double>(std::max<std::size_t>(1, count));
   std::size_t met = 0;
   for (std::size_t w = 0; w < waves_.size(); ++w) {
     Wave& wave = waves_[w];
@@ -316,7 +350,7 @@ double GatherIntegrator::markDone() {
     std::size_t metHere = 0;
     for (std::size_t i = 0; i < wave.count; ++i) {
       const std::size_t t = start + i;
-      const double light = static_cast<double>(luminance(sums_[t].flat)) / samplesOf_[t];
+      const double light = static_cast<double>(luminance(sums_.flat[t])) / samplesOf_[t];
       const bool inside = 2 * backFaces_[t] > samplesOf_[t];
       metHere += inside || static_cast<double>(errors_->standardError(w, i)) <=
                                static_cast<double>(options_.targetError) * std::max(light, floor);
@@ -324,15 +358,25 @@ double GatherIntegrator::markDone() {
     wave.done = wave.done || metHere == wave.count;
     met += metHere;
   }
-  return sums_.empty() ? 1.0 : static_cast<double>(met) / static_cast<double>(sums_.size());
+  return count == 0 ? 1.0 : static_cast<double>(met) / static_cast<double>(count);
+}
+
+TexelLight GatherIntegrator::takeLight() {
+  TexelLight light = std::move(sums_);
+  parallelFor(map_.size(), kSweepGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t t = first; t < last; ++t) {
+      const float scale = 1.0f / static_cast<float>(std::max(1u, weightOf(t)));
+      light.flat[t] *= scale;
+      for (std::vector<Vec3>& map : light.rnm) map[t] *= scale;
+    }
+  });
+  return light;
 }
 
 BakedTexel GatherIntegrator::texel(std::uint32_t page, std::size_t index) const {
   const std::size_t t = map_.firstOfPage(page) + index;
   const float scale = 1.0f / static_cast<float>(std::max(1u, weightOf(t)));
   BakedTexel baked;
-  baked.value.flat = sums_[t].flat * scale;
-  for (std::size_t k = 0; k < 3; ++k) baked.value.rnm[k] = sums_[t].rnm[k] * scale;
   baked.coverage = coverage_[t];
   const auto taken = static_cast<float>(std::max(1u, samplesOf_[t]));
   baked.validity = 1.0f - static_cast<float>(backFaces_[t]) / taken;

@@ -30,15 +30,33 @@ inline constexpr double kTargetShare = 0.95;
 /// The error of texels darker than this share of the mean is judged as if they were so bright.
 inline constexpr double kDarkFloor = 0.1;
 
-/// A texel as it is stored, before finishTexel.
+/// What is stored of a texel beside its light.
 struct BakedTexel {
-  SampleValue value;  // means
   float coverage = 0.0f;
   float validity = 1.0f;
   float standardError = 0.0f;
   std::uint32_t samples = 0;
   bool probed = false;
   std::array<Vec3, kProbeNormals> probes{};  // light on probeNormals(), where probed
+};
+
+/// Light of all texels, numbered through as in TexelMap: a vector for each map, so that each can be freed once its image
+/// is made.
+struct TexelLight {
+  std::vector<Vec3> flat;
+  std::array<std::vector<Vec3>, 3> rnm;
+
+  void resize(std::size_t count);
+};
+
+/// The links of the warm-up: 4 bytes each, and 8 more for those that pass on only a share.
+struct WarmLinks {
+  struct Share {
+    std::uint32_t link = 0;  // of the wave: texel * kWarmRays + ray
+    std::uint32_t weight = 0;
+  };
+  std::vector<std::uint32_t> texels;       // GatherWave::kWarmRays for each texel
+  std::vector<std::vector<Share>> shares;  // per wave, in order
 };
 
 /// The light of all texels of an atlas. Every pass reads the cache that the passes before it left, and the cache is
@@ -70,8 +88,11 @@ class GatherIntegrator {
   /// Errors: Interrupted.
   Expected<void> run(Progress& progress);
 
-  /// After run.
+  /// After run; once.
+  TexelLight takeLight();
+  /// After run. `probes` are means.
   BakedTexel texel(std::uint32_t page, std::size_t index) const;
+  std::size_t firstOfPage(std::size_t page) const { return map_.firstOfPage(page); }
 
   std::uint64_t rays() const { return rays_; }
   std::uint64_t shadowRays() const { return shadowRays_; }
@@ -84,15 +105,9 @@ class GatherIntegrator {
     std::uint32_t count = 0;
     bool done = false;  // the target error is met
   };
-  /// Sums over all samples so far.
-  struct Sums {
-    Vec3 flat{0};
-    std::array<Vec3, 3> rnm{Vec3(0), Vec3(0), Vec3(0)};
-  };
-
   Expected<void> warmUp(Progress& progress);
   /// `light`: irradiance / pi to begin with; `constant`: what every sweep finds again, links apart.
-  void solveLinks(std::span<const CacheLink> links, std::vector<Vec3> light, std::span<const Vec3> constant);
+  void solveLinks(const WarmLinks& links, std::vector<Vec3> light, std::span<const Vec3> constant);
   void makeCache();
   void makeSums();
   void dropCache();
@@ -126,7 +141,7 @@ class GatherIntegrator {
   std::vector<Wave> waves_;
   std::vector<LightSpread> spreads_;    // strategies and gather rays of every wave
   std::vector<std::size_t> firstWave_;  // per page
-  std::vector<Sums> sums_;
+  TexelLight sums_;  // over all samples so far
   std::vector<Vec3> levelSums_;  // levels.count per texel, unless endless
   std::vector<Vec3> reflectance_;
   std::vector<Vec3> cache_;  // levels.count per texel

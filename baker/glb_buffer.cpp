@@ -17,12 +17,11 @@ constexpr int kFloat = 5126;
 }  // namespace
 
 int GlbBuffer::addView(const void* data, std::size_t size, int target) {
-  bytes_.resize((bytes_.size() + 3) / 4 * 4, 0);
-  Json view = {{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", size}};
+  Json view = {{"buffer", 0}, {"byteOffset", size_}, {"byteLength", size}};
   if (target != kNoTarget) view["target"] = target;
-  const std::size_t at = bytes_.size();
-  bytes_.resize(at + size);
-  if (size > 0) std::memcpy(bytes_.data() + at, data, size);
+  std::vector<std::uint8_t>& piece = pieces_.emplace_back((size + 3) / 4 * 4, std::uint8_t{0});
+  if (size > 0) std::memcpy(piece.data(), data, size);
+  size_ += piece.size();
   bufferViews_.push_back(std::move(view));
   return static_cast<int>(bufferViews_.size()) - 1;
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "scene/math.h"
@@ -23,8 +24,9 @@ class GlbBuffer {
   /// Bytes without an accessor (an encoded image); returns the index of the buffer view.
   int addBytes(std::span<const std::uint8_t> bytes);
 
-  std::size_t size() const { return bytes_.size(); }
-  const std::vector<std::uint8_t>& bytes() const { return bytes_; }
+  std::size_t size() const { return size_; }
+  /// The bytes, view by view, each padded to four.
+  std::vector<std::vector<std::uint8_t>> takePieces() { return std::move(pieces_); }
   const Json& bufferViews() const { return bufferViews_; }
   const Json& accessors() const { return accessors_; }
 
@@ -32,7 +34,8 @@ class GlbBuffer {
   int addView(const void* data, std::size_t size, int target);
   int addAccessor(int view, int componentType, const char* type, std::size_t count);
 
-  std::vector<std::uint8_t> bytes_;
+  std::vector<std::vector<std::uint8_t>> pieces_;  // one buffer that grows would be moved, and held twice, again and again
+  std::size_t size_ = 0;
   Json bufferViews_ = Json::array();
   Json accessors_ = Json::array();
 };

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <numeric>
 #include <set>
+#include <span>
 
 #include "baker/glb_buffer.h"
 #include "baker/glb_materials.h"
@@ -16,23 +17,40 @@ using Json = nlohmann::ordered_json;
 
 std::size_t toSize(int i) { return static_cast<std::size_t>(i); }
 
-/// One triangle list as it goes into the file, whatever it came from.
-struct Geometry {
+/// A primitive that gets no lightmap, moved to world space like the surfaces.
+struct PlacedPrimitive {
   std::vector<Vec3> positions;
   std::vector<Vec3> normals;
   std::vector<Vec4> tangents;
-  std::vector<Vec2> lightmapUvs;            // empty without a lightmap
-  std::vector<std::uint32_t> sourceVertex;  // into the source primitive
+  std::vector<std::uint32_t> sourceVertex;
   std::vector<std::uint32_t> indices;
 };
 
-Geometry fromSurface(const Surface& surface) {
-  return {surface.positions,   surface.normals,      surface.tangents,
-          surface.lightmapUvs, surface.sourceVertex, surface.indices};
-}
+/// One triangle list as it goes into the file, whatever it came from.
+struct Geometry {
+  std::span<const Vec3> positions;
+  std::span<const Vec3> normals;
+  std::span<const Vec4> tangents;
+  std::span<const Vec2> lightmapUvs;            // empty without a lightmap
+  std::span<const std::uint32_t> sourceVertex;  // into the source primitive
+  std::span<const std::uint32_t> indices;
 
-/// A primitive that gets no lightmap, moved to world space like the surfaces.
-Geometry fromPrimitive(const Primitive& primitive, const Mat4& worldFromObject) {
+  explicit Geometry(const Surface& s)
+      : positions(s.positions),
+        normals(s.normals),
+        tangents(s.tangents),
+        lightmapUvs(s.lightmapUvs),
+        sourceVertex(s.sourceVertex),
+        indices(s.indices) {}
+  explicit Geometry(const PlacedPrimitive& p)
+      : positions(p.positions),
+        normals(p.normals),
+        tangents(p.tangents),
+        sourceVertex(p.sourceVertex),
+        indices(p.indices) {}
+};
+
+PlacedPrimitive place(const Primitive& primitive, const Mat4& worldFromObject) {
   const Mat3 linear(worldFromObject);
   const bool mirrors = glm::determinant(linear) < 0.0f;
   // The cofactor matrix: the inverse transpose up to scale, and defined for flattening transforms too.
@@ -43,7 +61,7 @@ Geometry fromPrimitive(const Primitive& primitive, const Mat4& worldFromObject) 
     const float length = glm::length(v);
     return length > 0.0f && std::isfinite(length) ? v / length : otherwise;
   };
-  Geometry g;
+  PlacedPrimitive g;
   for (const Vec3& p : primitive.positions) g.positions.push_back(Vec3(worldFromObject * Vec4(p, 1.0f)));
   for (const Vec3& n : primitive.normals) g.normals.push_back(unit(normalMatrix * n, Vec3(0, 1, 0)));
   for (const Vec4& t : primitive.tangents)
@@ -67,7 +85,7 @@ class GlbWriter {
  public:
   GlbWriter(const Scene& scene, const Atlas& atlas) : scene_(scene), atlas_(atlas) {}
 
-  Expected<std::vector<std::uint8_t>> write() {
+  Expected<std::vector<std::vector<std::uint8_t>>> write() {
     auto materials = describeMaterials(scene_, buffer_);
     if (!materials) return materials.error();
     addInstances();
@@ -93,14 +111,14 @@ class GlbWriter {
         const Surface& surface = atlas_.surfaces[next];
         written[toSize(surface.primitive)] = true;
         if (surface.indices.empty()) continue;
-        Json json = describe(fromSurface(surface), mesh.primitives[toSize(surface.primitive)]);
+        Json json = describe(Geometry(surface), mesh.primitives[toSize(surface.primitive)]);
         json["extras"]["lumel"]["page"] = surface.page;
         primitives.push_back(std::move(json));
       }
       for (std::size_t k = 0; k < mesh.primitives.size(); ++k)
         if (!written[k] && !mesh.primitives[k].indices.empty())
           primitives.push_back(
-              describe(fromPrimitive(mesh.primitives[k], instance.worldFromObject), mesh.primitives[k]));
+              describe(Geometry(place(mesh.primitives[k], instance.worldFromObject)), mesh.primitives[k]));
       if (primitives.empty()) continue;
       Json node = {{"name", instance.name}, {"mesh", meshes_.size()}};
       addSettings(node, instance.settings);
@@ -206,7 +224,7 @@ class GlbWriter {
     }
   }
 
-  Expected<std::vector<std::uint8_t>> assemble(GlbMaterials& materials) {
+  Expected<std::vector<std::vector<std::uint8_t>>> assemble(GlbMaterials& materials) {
     Json root = {{"asset", {{"version", "2.0"}, {"generator", std::string("Lumel ") + kVersion}}}, {"scene", 0}};
     Json scene = Json::object();
     if (!rootNodes_.empty()) scene["nodes"] = rootNodes_;
@@ -235,15 +253,14 @@ class GlbWriter {
   }
 
   /// The GLB container (glTF 2.0, 4.4): a header and two chunks padded to four bytes, JSON with spaces.
-  Expected<std::vector<std::uint8_t>> container(std::string json) const {
+  Expected<std::vector<std::vector<std::uint8_t>>> container(std::string json) {
     json.resize((json.size() + 3) / 4 * 4, ' ');
-    const std::size_t binary = (buffer_.size() + 3) / 4 * 4;
+    const std::size_t binary = buffer_.size();  // views are padded
     const std::size_t total = 12 + 8 + json.size() + (binary > 0 ? 8 + binary : 0);
     if (total > 0xFFFFFFFFu)
       return failure("scene.glb: " + std::to_string(total >> 20) +
                      " MiB are more than a GLB can hold; split the scene");
     std::vector<std::uint8_t> out;
-    out.reserve(total);
     const auto word = [&](std::size_t value) {
       for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<std::uint8_t>(value >> shift));
     };
@@ -256,10 +273,10 @@ class GlbWriter {
     if (binary > 0) {
       word(binary);
       word(0x004E4942);  // "BIN"
-      out.insert(out.end(), buffer_.bytes().begin(), buffer_.bytes().end());
-      out.resize(total, 0);
     }
-    return out;
+    std::vector<std::vector<std::uint8_t>> pieces = buffer_.takePieces();
+    pieces.insert(pieces.begin(), std::move(out));
+    return pieces;
   }
 
   const Scene& scene_;
@@ -274,7 +291,7 @@ class GlbWriter {
 
 }  // namespace
 
-Expected<std::vector<std::uint8_t>> encodeGlb(const Scene& scene, const Atlas& atlas) {
+Expected<std::vector<std::vector<std::uint8_t>>> encodeGlb(const Scene& scene, const Atlas& atlas) {
   return GlbWriter(scene, atlas).write();
 }
 

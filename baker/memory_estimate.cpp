@@ -11,14 +11,20 @@ namespace {
 /// The program with its libraries, and what every bake keeps for its threads.
 constexpr double kBase = 145e6;
 
-// The gather warms up its cache with links that are gone when it samples; the pages are made when its cache is gone.
-constexpr double kWarmUpPerCovered = 150.0;  // coordinates 16, cache 28, links and light 100, waves
-constexpr double kResultPerCovered = 95.0;   // coordinates 16, sums 71, waves and probes
-constexpr double kLookupPerPageTexel = 4.0;
-constexpr double kImagesPerPageTexel = 64.0;  // three RNM maps, the flat one and aux, in floats
+// Bytes per covered texel and per texel of the pages, and what is resident then.
+// Sampling: places 16, sums 48, reflectance 12, cache 12, counts 13, errors 13, figures of waves 10; the map from pages
+// to texels. The warm-up before it takes less: its links are 32.
+constexpr double kSamplingPerCovered = 124.0;
+constexpr double kSamplingPerPageTexel = 4.0;
+// Finishing: places; the five images 64, the denoiser's strips, charts and masks.
+constexpr double kFinishingPerCovered = 16.0;
+constexpr double kFinishingPerPageTexel = 80.0;
 
-/// The scene, its surfaces, Embree's triangles and tree, and where each triangle lies on its page.
-constexpr double kPerTriangle = 350.0;
+// Bytes per triangle. Charts: half-edges, and one chart's equations. Sampling: the scene and its surfaces 110, Embree's
+// tree and corners 70, where each triangle lies on its page 32. Then Embree is gone; scene.glb comes last.
+constexpr double kChartsPerTriangle = 290.0;
+constexpr double kSamplingPerTriangle = 220.0;
+constexpr double kFinishingPerTriangle = 150.0;
 constexpr double kPerDecodedTexel = 4.0;
 
 }  // namespace
@@ -43,11 +49,13 @@ BakeSize sceneSize(const Scene& scene) {
 }
 
 double bakeMemory(const BakeSize& size) {
-  const double warmUp = kWarmUpPerCovered * size.coveredTexels + kLookupPerPageTexel * size.pageTexels;
-  const double result = kResultPerCovered * size.coveredTexels + kImagesPerPageTexel * size.pageTexels;
+  const double charts = kChartsPerTriangle * size.triangles;
+  const double sampling = kSamplingPerTriangle * size.triangles + kPerDecodedTexel * size.decodedTexels +
+                          kSamplingPerCovered * size.coveredTexels + kSamplingPerPageTexel * size.pageTexels;
   // scene.glb holds the encoded images once more, while it is written.
-  return kBase + 2 * size.encodedBytes + kPerDecodedTexel * size.decodedTexels + kPerTriangle * size.triangles +
-         std::max(warmUp, result);
+  const double finishing = size.encodedBytes + kFinishingPerTriangle * size.triangles +
+                           kFinishingPerCovered * size.coveredTexels + kFinishingPerPageTexel * size.pageTexels;
+  return kBase + size.encodedBytes + std::max({charts, sampling, finishing});
 }
 
 }  // namespace lumel

@@ -163,14 +163,12 @@ EmbreeGeometry RayScene::triangles(const Primitive& primitive, const Mat4* world
   EmbreeGeometry geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
   auto* positions =
       embreeBuffer<Vec3>(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, primitive.positions.size());
-  auto* indices = embreeBuffer<std::array<std::uint32_t, 3>>(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3,
-                                                             primitive.triangleCount());
-  if (!positions || !indices) return nullptr;
+  if (!positions) return nullptr;
+  rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, primitive.indices.data(), 0,
+                             3 * sizeof(std::uint32_t), primitive.triangleCount());
   for (std::size_t i = 0; i < primitive.positions.size(); ++i)
     positions[i] =
         worldFromObject ? Vec3(*worldFromObject * Vec4(primitive.positions[i], 1.0f)) : primitive.positions[i];
-  for (std::size_t i = 0; i < primitive.triangleCount(); ++i)
-    indices[i] = {primitive.indices[3 * i], primitive.indices[3 * i + 1], primitive.indices[3 * i + 2]};
   if (vertices) *vertices = positions;
   if (materials_->needsAlphaTest(primitive)) {
     alphaTested_.push_back(std::make_unique<AlphaTested>(AlphaTested{materials_, &primitive}));

@@ -1,11 +1,8 @@
-// Wall time per stage and the peak memory of the process.
+// Wall time per stage.
 #pragma once
-
-#include <sys/resource.h>
 
 #include <chrono>
 #include <cstdio>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -40,19 +37,5 @@ class StageClock {
   bool running_ = false;
   bool quiet_ = false;
 };
-
-/// Most memory that this process has had resident so far. (getrusage would count what its parent had when it forked.)
-inline std::size_t peakMemoryBytes() {
-  std::ifstream status("/proc/self/status");
-  for (std::string word; status >> word;)
-    if (word == "VmHWM:") {
-      std::size_t kibibytes = 0;
-      status >> kibibytes;
-      return kibibytes * 1024;
-    }
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::size_t>(usage.ru_maxrss) * 1024;  // Linux counts kibibytes
-}
 
 }  // namespace lumel

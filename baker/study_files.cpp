@@ -180,7 +180,7 @@ Expected<void> writeStudy(const fs::path& dir, const Study& study, const std::st
   const auto write = [&](const std::string& name, const std::string& text) -> Expected<void> {
     const auto file = files->add(dir / name);
     if (!file) return file.error();
-    return writeBytes(*file, text.data(), text.size());
+    return writeBytes(*file, text);
   };
   const Plot rays = errorPlot(study, "Error against rays: " + scene, "rays per texel, all kinds", raysPerTexel);
   const Plot time =

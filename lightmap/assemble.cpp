@@ -54,7 +54,12 @@ class SurfaceBuilder {
     surface_.charts.push_back(placed.chart);
   }
 
-  Surface take() { return std::move(surface_); }
+  Surface take() {
+    const auto fit = [](auto&... arrays) { (arrays.shrink_to_fit(), ...); };
+    fit(surface_.positions, surface_.normals, surface_.lightmapUvs, surface_.sourceVertex, surface_.indices,
+        surface_.sourceTriangle, surface_.charts);
+    return std::move(surface_);
+  }
 
  private:
   Vec3 normal(std::uint32_t source) const { return normalMatrix_ * source_.normals[source]; }

@@ -15,7 +15,10 @@ constexpr std::size_t kMaps = 4;
 constexpr std::size_t kColors = 3 * kMaps;
 constexpr int kPatch = 1;  // patches of 3 x 3 texels are compared
 constexpr int kHalo = kDenoiseRadius + kPatch;
-constexpr std::size_t kBandRows = 32;
+/// Tiles that stay in a core's cache while all pairs are added, in strips that bound what is kept of changed rows.
+constexpr std::size_t kTileRows = 32;
+constexpr std::size_t kTileColumns = 256;
+constexpr std::size_t kStripRows = 4 * kTileRows;
 
 /// Variance of the luminance of an RNM map over that of the flat map: 1.7 to 2 measured over a level and a box.
 constexpr float kRnmVariance = 2.0f;
@@ -24,9 +27,10 @@ constexpr float kLargestDistance = 4.0f;
 /// Noise below this share of a texel's light is rounding.
 constexpr float kLeastRelativeError = 1e-5f;
 
-/// Some rows of a page, with a margin around them, one plane per quantity so that loops along rows vectorise.
-struct Band {
+/// Part of a page, with a margin around it, one plane per quantity so that loops along rows vectorise.
+struct Tile {
   std::size_t rows = 0;
+  std::size_t columns = 0;
   std::size_t stride = 0;
   std::vector<std::uint32_t> charts;
   std::vector<float> variance;
@@ -38,38 +42,70 @@ struct Band {
   }
 };
 
-using MapPointers = std::array<const Image*, kMaps>;
+/// The rows of the maps as they were: those above `firstKept` + kHalo have changed, of the last of them `kept` holds
+/// copies.
+struct Rows {
+  std::array<Image*, kMaps> maps;
+  std::array<std::vector<float>, kMaps> kept;  // kHalo rows
+  std::ptrdiff_t firstKept = -kHalo;
 
-Band readBand(const MapPointers& maps, std::span<const std::uint32_t> chartIds, std::span<const float> standardError,
-              std::ptrdiff_t firstRow, std::size_t rows) {
-  const std::ptrdiff_t width = maps[0]->width;
-  const std::ptrdiff_t height = maps[0]->height;
-  Band band;
-  band.rows = rows;
-  band.stride = static_cast<std::size_t>(width + 2 * kHalo);
-  const std::size_t count = band.stride * (rows + 2 * kHalo);
-  band.charts.assign(count, 0);
-  band.variance.assign(count, std::numeric_limits<float>::min());
-  for (auto& plane : band.luminances) plane.assign(count, 0.0f);
-  for (auto& plane : band.colors) plane.assign(count, 0.0f);
+  std::size_t rowSize() const { return static_cast<std::size_t>(maps[0]->width) * 3; }
+  const float* row(std::size_t map, std::ptrdiff_t y) const {
+    if (y >= firstKept + kHalo) return maps[map]->pixels.data() + static_cast<std::size_t>(y) * rowSize();
+    return kept[map].data() + static_cast<std::size_t>(y - firstKept) * rowSize();
+  }
+  /// Before rows up to `last`, all of them after those that are kept, change. They must be at least kHalo.
+  void keepBefore(std::ptrdiff_t last) {
+    firstKept = last - kHalo;
+    for (std::size_t m = 0; m < kMaps; ++m) {
+      const float* from = maps[m]->pixels.data() + static_cast<std::size_t>(firstKept) * rowSize();
+      kept[m].assign(from, from + kHalo * rowSize());
+    }
+  }
+};
+
+/// What the texels of a page are judged by.
+struct Judged {
+  std::span<const std::uint32_t> chartIds;
+  std::span<const float> errors;
+  std::size_t stride;
+};
+
+Tile readTile(const Rows& from, const Judged& judged, std::ptrdiff_t firstRow, std::size_t rows,
+              std::ptrdiff_t firstColumn, std::size_t columns) {
+  const std::ptrdiff_t width = from.maps[0]->width;
+  const std::ptrdiff_t height = from.maps[0]->height;
+  Tile tile;
+  tile.rows = rows;
+  tile.columns = columns;
+  tile.stride = columns + 2 * kHalo;
+  const std::size_t count = tile.stride * (rows + 2 * kHalo);
+  tile.charts.assign(count, 0);
+  tile.variance.assign(count, std::numeric_limits<float>::min());
+  for (auto& plane : tile.luminances) plane.assign(count, 0.0f);
+  for (auto& plane : tile.colors) plane.assign(count, 0.0f);
+  const std::ptrdiff_t left = std::max<std::ptrdiff_t>(0, firstColumn - kHalo);
+  const std::ptrdiff_t right = std::min(width, firstColumn + static_cast<std::ptrdiff_t>(columns) + kHalo);
   for (std::ptrdiff_t row = -kHalo; row < static_cast<std::ptrdiff_t>(rows) + kHalo; ++row) {
     const std::ptrdiff_t y = firstRow + row;
     if (y < 0 || y >= height) continue;
-    for (std::ptrdiff_t x = 0; x < width; ++x) {
+    std::array<const float*, kMaps> pixels{};
+    for (std::size_t m = 0; m < kMaps; ++m) pixels[m] = from.row(m, y);
+    for (std::ptrdiff_t x = left; x < right; ++x) {
       const auto source = static_cast<std::size_t>(y * width + x);
-      if (chartIds[source] == 0) continue;
-      const std::size_t to = band.at(row, x);
-      band.charts[to] = chartIds[source];
+      if (judged.chartIds[source] == 0) continue;
+      const std::size_t to = tile.at(row, x - firstColumn);
+      tile.charts[to] = judged.chartIds[source];
       for (std::size_t m = 0; m < kMaps; ++m) {
-        const Vec3 color = maps[m]->rgb(static_cast<int>(x), static_cast<int>(y));
-        for (int c = 0; c < 3; ++c) band.colors[m * 3 + static_cast<std::size_t>(c)][to] = color[c];
-        band.luminances[m][to] = luminance(color);
+        const float* pixel = pixels[m] + x * 3;
+        for (std::size_t c = 0; c < 3; ++c) tile.colors[m * 3 + c][to] = pixel[c];
+        tile.luminances[m][to] = luminance(Vec3(pixel[0], pixel[1], pixel[2]));
       }
-      const float error = std::max(standardError[source], kLeastRelativeError * band.luminances[0][to]);
-      band.variance[to] += error * error;
+      const float error = std::max(judged.errors[source * judged.stride], kLeastRelativeError * tile.luminances[0][to]);
+      tile.variance[to] += error * error;
     }
   }
-  return band;
+  return tile;
 }
 
 /// Scratch of one row of differences: 1 and the distance where both texels are of one chart, else 0 and 0.
@@ -80,14 +116,14 @@ struct Differences {
 
 /// Squared difference of texels `shift` apart, less what their noise explains, relative to that noise; the mean over
 /// the four maps. Each entry is the sum over a row of the patch. Entries x of [0, width).
-void differencesOfRow(const Band& band, std::ptrdiff_t row, std::ptrdiff_t shift, std::size_t width, Differences& raw,
+void differencesOfRow(const Tile& tile, std::ptrdiff_t row, std::ptrdiff_t shift, std::size_t width, Differences& raw,
                       Differences& out) {
-  const std::size_t first = band.at(row, -kPatch);
+  const std::size_t first = tile.at(row, -kPatch);
   const std::size_t count = width + 2 * kPatch;
-  const std::uint32_t* chart = band.charts.data() + first;
-  const float* variance = band.variance.data() + first;
+  const std::uint32_t* chart = tile.charts.data() + first;
+  const float* variance = tile.variance.data() + first;
   std::array<const float*, kMaps> light{};
-  for (std::size_t m = 0; m < kMaps; ++m) light[m] = band.luminances[m].data() + first;
+  for (std::size_t m = 0; m < kMaps; ++m) light[m] = tile.luminances[m].data() + first;
   for (std::size_t k = 0; k < count; ++k) {
     const auto i = static_cast<std::ptrdiff_t>(k);
     const float noise = variance[i] + variance[i + shift];
@@ -106,7 +142,7 @@ void differencesOfRow(const Band& band, std::ptrdiff_t row, std::ptrdiff_t shift
   }
 }
 
-/// Weighted sums of a band's texels.
+/// Weighted sums of a tile's texels.
 struct Sums {
   std::vector<float> weight;
   std::array<std::vector<float>, kColors> colors;
@@ -115,20 +151,23 @@ struct Sums {
 /// How far the patches around texels of one row and those `shift` from them agree, 0 to 1; called row by row.
 class Agreement {
  public:
-  Agreement(const Band& band, std::ptrdiff_t shift, std::size_t width) : band_(band), shift_(shift), width_(width) {
+  Agreement(const Tile& tile, std::ptrdiff_t shift, std::size_t width) : tile_(tile), shift_(shift), width_(width) {
     const Differences empty{std::vector<float>(width + 2 * kPatch), std::vector<float>(width + 2 * kPatch)};
     raw_ = empty;
     ring_ = {empty, empty, empty};
-    for (const std::ptrdiff_t row : {-1, 0}) differencesOfRow(band_, row, shift_, width_, raw_, ringRow(row));
+    for (const std::ptrdiff_t row : {-1, 0}) differencesOfRow(tile_, row, shift_, width_, raw_, ringRow(row));
   }
 
   /// Rows from 0 on, without a gap.
   void ofRow(std::ptrdiff_t row, std::vector<float>& weights) {
-    differencesOfRow(band_, row + 1, shift_, width_, raw_, ringRow(row + 1));
-    const std::uint32_t* chart = band_.charts.data() + band_.at(row, 0);
+    differencesOfRow(tile_, row + 1, shift_, width_, raw_, ringRow(row + 1));
+    const std::uint32_t* chart = tile_.charts.data() + tile_.at(row, 0);
+    const Differences& above = ringRow(row - 1);
+    const Differences& here = ringRow(row);
+    const Differences& below = ringRow(row + 1);
     for (std::size_t x = 0; x < width_; ++x) {
-      const float distance = ring_[0].distance[x] + ring_[1].distance[x] + ring_[2].distance[x];
-      const float comparable = ring_[0].comparable[x] + ring_[1].comparable[x] + ring_[2].comparable[x];
+      const float distance = above.distance[x] + here.distance[x] + below.distance[x];
+      const float comparable = above.comparable[x] + here.comparable[x] + below.comparable[x];
       // In this order of arguments what is not a number stays so, and is not greater than zero.
       const float agreement = 1.0f - std::max(distance / std::max(comparable, 1.0f), 0.0f) / kLargestDistance;
       const bool shares = chart[x] != 0 && chart[x] == chart[static_cast<std::ptrdiff_t>(x) + shift_];
@@ -139,33 +178,33 @@ class Agreement {
  private:
   Differences& ringRow(std::ptrdiff_t row) { return ring_[static_cast<std::size_t>(row + 3) % 3]; }
 
-  const Band& band_;
+  const Tile& tile_;
   std::ptrdiff_t shift_;
   std::size_t width_;
   Differences raw_;
   std::array<Differences, 3> ring_;
 };
 
-/// Adds to every texel of the band the two that lie (dx, dy) and (-dx, -dy) from it, as far as the patches of both
+/// Adds to every texel of the tile the two that lie (dx, dy) and (-dx, -dy) from it, as far as the patches of both
 /// agree with its own. Alone, a texel on one side would bend a slope of light, at the borders of charts most of all; in
 /// pairs slopes cancel.
-void addPair(const Band& band, std::ptrdiff_t dx, std::ptrdiff_t dy, std::size_t width, Sums& sums) {
-  const std::ptrdiff_t shift = dy * static_cast<std::ptrdiff_t>(band.stride) + dx;
-  Agreement ahead(band, shift, width);
-  Agreement behind(band, -shift, width);
+void addPair(const Tile& tile, std::ptrdiff_t dx, std::ptrdiff_t dy, std::size_t width, Sums& sums) {
+  const std::ptrdiff_t shift = dy * static_cast<std::ptrdiff_t>(tile.stride) + dx;
+  Agreement ahead(tile, shift, width);
+  Agreement behind(tile, -shift, width);
   std::vector<float> weights(width);
   std::vector<float> others(width);
-  for (std::ptrdiff_t row = 0; row < static_cast<std::ptrdiff_t>(band.rows); ++row) {
+  for (std::ptrdiff_t row = 0; row < static_cast<std::ptrdiff_t>(tile.rows); ++row) {
     ahead.ofRow(row, weights);
     behind.ofRow(row, others);
-    const auto here = static_cast<std::ptrdiff_t>(band.at(row, 0));
+    const auto here = static_cast<std::ptrdiff_t>(tile.at(row, 0));
     const std::size_t to = static_cast<std::size_t>(row) * width;
     for (std::size_t x = 0; x < width; ++x) {
       weights[x] = std::min(weights[x], others[x]);
       sums.weight[to + x] += 2.0f * weights[x];
     }
     for (std::size_t c = 0; c < kColors; ++c) {
-      const float* from = band.colors[c].data() + here;
+      const float* from = tile.colors[c].data() + here;
       float* sum = sums.colors[c].data() + to;
       for (std::size_t k = 0; k < width; ++k) {
         const auto x = static_cast<std::ptrdiff_t>(k);
@@ -175,47 +214,75 @@ void addPair(const Band& band, std::ptrdiff_t dx, std::ptrdiff_t dy, std::size_t
   }
 }
 
-Sums averageBand(const Band& band, std::size_t width) {
+Sums averageTile(const Tile& tile) {
   Sums sums;
-  const std::size_t count = width * band.rows;
+  const std::size_t width = tile.columns;
+  const std::size_t count = width * tile.rows;
   sums.weight.assign(count, 0.0f);
   for (std::size_t c = 0; c < kColors; ++c) sums.colors[c].assign(count, 0.0f);
-  for (std::size_t row = 0; row < band.rows; ++row) {
-    const std::size_t here = band.at(static_cast<std::ptrdiff_t>(row), 0);
+  for (std::size_t row = 0; row < tile.rows; ++row) {
+    const std::size_t here = tile.at(static_cast<std::ptrdiff_t>(row), 0);
     for (std::size_t x = 0; x < width; ++x) {
-      if (band.charts[here + x] == 0) continue;
+      if (tile.charts[here + x] == 0) continue;
       sums.weight[row * width + x] = 1.0f;
-      for (std::size_t c = 0; c < kColors; ++c) sums.colors[c][row * width + x] = band.colors[c][here + x];
+      for (std::size_t c = 0; c < kColors; ++c) sums.colors[c][row * width + x] = tile.colors[c][here + x];
     }
   }
   for (int dy = 0; dy <= kDenoiseRadius; ++dy)
-    for (int dx = dy == 0 ? 1 : -kDenoiseRadius; dx <= kDenoiseRadius; ++dx) addPair(band, dx, dy, width, sums);
+    for (int dx = dy == 0 ? 1 : -kDenoiseRadius; dx <= kDenoiseRadius; ++dx) addPair(tile, dx, dy, width, sums);
   return sums;
+}
+
+/// Writes a tile's averages into a strip of the page; (row, column): of the tile in the strip.
+void storeTile(const Tile& tile, std::size_t row, std::size_t column, std::size_t width,
+               std::array<std::vector<float>, kMaps>& strip) {
+  const Sums sums = averageTile(tile);
+  for (std::size_t y = 0; y < tile.rows; ++y)
+    for (std::size_t x = 0; x < tile.columns; ++x) {
+      const std::size_t i = y * tile.columns + x;
+      if (!(sums.weight[i] > 0.0f)) continue;
+      float* pixel = nullptr;
+      for (std::size_t c = 0; c < kColors; ++c) {
+        if (c % 3 == 0) pixel = strip[c / 3].data() + ((row + y) * width + column + x) * 3;
+        pixel[c % 3] = sums.colors[c][i] / sums.weight[i];
+      }
+    }
 }
 
 }  // namespace
 
 void denoise(Image& flat, std::array<Image, 3>& rnm, std::span<const std::uint32_t> chartIds,
-             std::span<const float> standardError) {
+             std::span<const float> standardError, std::size_t stride) {
   const auto width = static_cast<std::size_t>(flat.width);
   const auto height = static_cast<std::size_t>(flat.height);
-  LUMEL_CHECK(chartIds.size() == width * height && standardError.size() == width * height);
-  const std::array<Image*, kMaps> maps = {&flat, &rnm[0], &rnm[1], &rnm[2]};
-  for (const Image* map : maps)
+  LUMEL_CHECK(chartIds.size() == width * height && standardError.size() + stride > width * height * stride);
+  Rows before{{&flat, &rnm[0], &rnm[1], &rnm[2]}, {}};
+  for (const Image* map : before.maps)
     LUMEL_CHECK(map->width == flat.width && map->height == flat.height && map->channels == 3);
-  // Bands read rows that their neighbours change.
-  const std::array<Image, kMaps> before = {flat, rnm[0], rnm[1], rnm[2]};
-  const MapPointers from = {&before[0], &before[1], &before[2], &before[3]};
-  parallelFor(height, kBandRows, [&](std::size_t first, std::size_t last) {
-    const Band band = readBand(from, chartIds, standardError, static_cast<std::ptrdiff_t>(first), last - first);
-    const Sums sums = averageBand(band, width);
-    for (std::size_t i = 0; i < sums.weight.size(); ++i) {
-      const std::size_t texel = first * width + i;
-      if (chartIds[texel] == 0 || !(sums.weight[i] > 0.0f)) continue;
-      for (std::size_t c = 0; c < kColors; ++c)
-        maps[c / 3]->pixels[texel * 3 + c % 3] = sums.colors[c][i] / sums.weight[i];
+  const Judged judged{chartIds, standardError, stride};
+  const std::size_t tilesPerRow = (width + kTileColumns - 1) / kTileColumns;
+  std::array<std::vector<float>, kMaps> strip;
+  for (std::size_t first = 0; first < height; first += kStripRows) {
+    const std::size_t last = std::min(height, first + kStripRows);
+    for (std::size_t m = 0; m < kMaps; ++m) {
+      const auto from = before.maps[m]->pixels.begin() + static_cast<std::ptrdiff_t>(first * width * 3);
+      strip[m].assign(from, from + static_cast<std::ptrdiff_t>((last - first) * width * 3));
     }
-  });
+    const std::size_t tiles = tilesPerRow * ((last - first + kTileRows - 1) / kTileRows);
+    parallelFor(tiles, 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t t = begin; t < end; ++t) {
+        const std::size_t row = first + t / tilesPerRow * kTileRows;
+        const std::size_t column = t % tilesPerRow * kTileColumns;
+        const Tile tile = readTile(before, judged, static_cast<std::ptrdiff_t>(row), std::min(kTileRows, last - row),
+                                   static_cast<std::ptrdiff_t>(column), std::min(kTileColumns, width - column));
+        storeTile(tile, row - first, column, width, strip);
+      }
+    });
+    if (last < height) before.keepBefore(static_cast<std::ptrdiff_t>(last));
+    for (std::size_t m = 0; m < kMaps; ++m)
+      std::copy(strip[m].begin(), strip[m].end(),
+                before.maps[m]->pixels.begin() + static_cast<std::ptrdiff_t>(first * width * 3));
+  }
 }
 
 }  // namespace lumel

@@ -160,10 +160,17 @@ Expected<void> FileSet::exchange(bool tellsLast, const std::function<bool(const 
   return {};
 }
 
-Expected<void> writeBytes(const PendingFile& file, const void* data, std::size_t size) {
+Expected<void> writeBytes(const PendingFile& file, std::string_view bytes) {
+  const std::vector<std::uint8_t> piece(bytes.begin(), bytes.end());
+  return writeBytes(file, {&piece, 1});
+}
+
+Expected<void> writeBytes(const PendingFile& file, std::span<const std::vector<std::uint8_t>> pieces) {
   std::FILE* out = std::fopen(file.path.c_str(), "wb");
-  bool written = out && std::fwrite(data, 1, size, out) == size;
-  written = out && std::fflush(out) == 0 && written;
+  bool written = out != nullptr;
+  for (const std::vector<std::uint8_t>& piece : pieces)
+    written = written && std::fwrite(piece.data(), 1, piece.size(), out) == piece.size();
+  written = written && std::fflush(out) == 0;
   const int error = errno;
   if (out) std::fclose(out);
   if (!written) return cannotWrite(file.place, std::strerror(error));

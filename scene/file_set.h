@@ -1,10 +1,12 @@
 // Results of one file or more: made whole where no reader looks, then put in place together.
 #pragma once
 
-#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "scene/expected.h"
@@ -70,7 +72,9 @@ class FileSet {
 };
 
 /// Errors: Failed, naming the place.
-Expected<void> writeBytes(const PendingFile& file, const void* data, std::size_t size);
+Expected<void> writeBytes(const PendingFile& file, std::string_view bytes);
+/// The pieces one after the other.
+Expected<void> writeBytes(const PendingFile& file, std::span<const std::vector<std::uint8_t>> pieces);
 
 /// Finds out before the long work whether `dir` can be written: makes it and a file in it, and removes what it made.
 /// Errors: Failed, naming the folder.

@@ -112,7 +112,7 @@ Expected<void> writeDds(const PendingFile& file, std::span<const Image> levels, 
     if (progress.cancelled()) return interrupted();
     bytes.insert(bytes.end(), more.begin(), more.end());
   }
-  return writeBytes(file, bytes.data(), bytes.size());
+  return writeBytes(file, {&bytes, 1});
 }
 
 }  // namespace lumel::ssbump

@@ -267,7 +267,7 @@ Expected<void> writeStudy(const Image& map, const std::string& title, const std:
   if (auto done = writeImage(*pictureFile, picture, options, progress); !done) return done;
   const auto textFile = files->add(folder / "study.md");
   if (!textFile) return textFile.error();
-  if (auto done = writeBytes(*textFile, text.data(), text.size()); !done) return done;
+  if (auto done = writeBytes(*textFile, text); !done) return done;
   return files->commitFolder({});
 }
 

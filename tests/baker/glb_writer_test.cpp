@@ -53,14 +53,22 @@ struct Fixture {
     atlas.surfaces = {s};
   }
 
+  std::string encoded() const {
+    const auto pieces = encodeGlb(scene, atlas);
+    EXPECT_TRUE(pieces);
+    std::string glb;
+    if (pieces)
+      for (const auto& piece : *pieces) glb.append(piece.begin(), piece.end());
+    return glb;
+  }
+
   Scene roundTrip() const {
-    const auto glb = encodeGlb(scene, atlas);
-    EXPECT_TRUE(glb);
+    const std::string glb = encoded();
     const auto* info = testing::UnitTest::GetInstance()->current_test_info();
     const fs::path dir = fs::path(testing::TempDir()) / (std::string("lumel-glb-") + info->name());
     fs::create_directories(dir);
     std::ofstream(dir / "scene.glb", std::ios::binary)
-        .write(reinterpret_cast<const char*>(glb->data()), static_cast<std::streamsize>(glb->size()));
+        .write(glb.data(), static_cast<std::streamsize>(glb.size()));
     auto loaded = loadScene(dir / "scene.glb");
     EXPECT_TRUE(loaded) << (loaded ? "" : loaded.error().message);
     return loaded ? std::move(*loaded) : Scene();
@@ -195,20 +203,20 @@ TEST(GlbWriter, LightsAndCamerasSurvive) {
 }
 
 TEST(GlbWriter, ContainerFollowsTheSpecification) {
-  const auto glb = encodeGlb(Fixture().scene, Fixture().atlas);
-  ASSERT_TRUE(glb);
+  const std::string glb = Fixture().encoded();
+  ASSERT_GT(glb.size(), 20u);
   const auto word = [&](std::size_t at) {
     std::uint32_t value = 0;
-    std::memcpy(&value, glb->data() + at, 4);
+    std::memcpy(&value, glb.data() + at, 4);
     return static_cast<std::size_t>(value);
   };
   EXPECT_EQ(word(0), 0x46546C67u);
   EXPECT_EQ(word(4), 2u);
-  EXPECT_EQ(word(8), glb->size());
+  EXPECT_EQ(word(8), glb.size());
   const std::size_t jsonSize = word(12);
   EXPECT_EQ(jsonSize % 4, 0u);
   EXPECT_EQ(word(16), 0x4E4F534Au);
-  const auto json = nlohmann::json::parse(glb->begin() + 20, glb->begin() + 20 + static_cast<std::ptrdiff_t>(jsonSize),
+  const auto json = nlohmann::json::parse(glb.begin() + 20, glb.begin() + 20 + static_cast<std::ptrdiff_t>(jsonSize),
                                           nullptr, false);
   ASSERT_FALSE(json.is_discarded());
   EXPECT_EQ(word(20 + jsonSize) % 4, 0u);

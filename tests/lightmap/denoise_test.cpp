@@ -168,6 +168,35 @@ TEST(Denoise, SameBytesForAnyThreadCount) {
   EXPECT_EQ(one.rnm[2].pixels, four.rnm[2].pixels);
 }
 
+/// Pages are worked on in tiles, rows above a strip of them have changed already: neither may be seen.
+TEST(Denoise, PlaceOnThePageDoesNotMatter) {
+  constexpr int kWidth = 290;
+  constexpr int kHeight = 300;
+  const auto denoisedAt = [](int left, int top) {
+    const int width = kWidth + 300;
+    const int height = kHeight + 150;
+    Image flat(width, height, 3);
+    std::array<Image, 3> rnm = {flat, flat, flat};
+    std::vector<std::uint32_t> charts(flat.pixels.size() / 3, 0);
+    const std::vector<float> errors(charts.size() * 2, 0.2f);
+    std::mt19937 random(7);
+    std::normal_distribution<float> noise(1.0f, 0.2f);
+    for (int y = top; y < top + kHeight; ++y)
+      for (int x = left; x < left + kWidth; ++x) {
+        charts[static_cast<std::size_t>(y * width + x)] = 1;
+        for (Image* map : {&flat, &rnm[0], &rnm[1], &rnm[2]}) map->setRgb(x, y, Vec3(noise(random)));
+      }
+    denoise(flat, rnm, charts, errors, 2);
+    std::vector<float> values;
+    for (int y = top; y < top + kHeight; ++y)
+      for (int x = left; x < left + kWidth; ++x) values.push_back(flat.rgb(x, y).x + rnm[2].rgb(x, y).x);
+    return values;
+  };
+  const std::vector<float> values = denoisedAt(0, 0);
+  EXPECT_EQ(values, denoisedAt(37, 101));
+  EXPECT_EQ(values, denoisedAt(300, 1));
+}
+
 TEST(Denoise, PagesSmallerThanThePatch) {
   for (const int side : {0, 1, 2}) {
     Image flat(side, side, 3, 0.5f);

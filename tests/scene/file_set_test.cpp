@@ -26,7 +26,7 @@ class FileSets : public testing::Test {
   void add(FileSet& set, const fs::path& name, const std::string& text) const {
     const auto file = set.add(dir_ / name);
     ASSERT_TRUE(file) << file.error().message;
-    ASSERT_TRUE(writeBytes(*file, text.data(), text.size()));
+    ASSERT_TRUE(writeBytes(*file, text));
   }
   /// Every file, hidden ones too, by its path in the folder.
   std::map<std::string, std::string> files() const {
