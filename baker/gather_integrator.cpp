@@ -200,6 +200,7 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   findBuried();
   substituteInvalid(std::vector<std::uint32_t>(count, GatherWave::kWarmRays));
   solveLinks(links, std::move(first), constant);
+  scene_.reflectance = reflectance_;
   std::fill(backFaces_.begin(), backFaces_.end(), 0u);
   return {};
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "baker/direct_light.h"
@@ -30,13 +31,34 @@ struct Flight {
 /// Sink receives what rays find, in an order that depends on the rays alone:
 ///   light(flight, radiance, depth)   radiance that exists for bakes of `depth` indirect bounces and more
 ///   texel(flight, texel)             the flight ended on this texel
+///   prefetch(texel)                  texel(...) will probably be called with it
 ///   backFace(flight) -> bool         a gather ray met the back of a single-sided surface; whether to go on from there
 template <class Sink>
 class GatherTracer {
  public:
-  /// Hits at depth `lastDepth` bring their own emission alone.
-  GatherTracer(const LightTransport& transport, const TexelMap& map, int lastDepth, Sink& sink)
-      : transport_(transport), map_(map), lastDepth_(lastDepth), sink_(sink) {}
+  /// Hits at depth `lastDepth` bring their own emission alone. `reflectance`: of the texels, where it is known; else
+  /// empty. It is what the back of a surface with a lightmap reflects, as its front does.
+  GatherTracer(const LightTransport& transport, const TexelMap& map, std::span<const Vec3> reflectance, int lastDepth,
+               Sink& sink)
+      : transport_(transport), map_(map), reflectance_(reflectance), lastDepth_(lastDepth), sink_(sink) {}
+
+  /// What the rays of a packet found; flightOf(lane) tells of each.
+  template <class FlightOf>
+  void arriveAll(const RayPacket& packet, FlightOf flightOf) {
+    TexelMap::Lookup lookup;
+    map_.findAll(packet, lookup);
+    for (const std::uint32_t texel : lookup.texels)
+      if (texel != kNoTexel) sink_.prefetch(texel);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      if (!packet.valid[lane]) continue;
+      const Flight& flight = flightOf(lane);
+      const std::uint32_t texel = lookup.texels[static_cast<std::size_t>(lane)];
+      if (texel != kNoTexel && flight.depth < lastDepth_)
+        sink_.texel(flight, texel);
+      else
+        arrive(packet, lane, flight);
+    }
+  }
 
   /// What a traced ray found. Precondition: packet.valid[lane].
   void arrive(const RayPacket& packet, int lane, const Flight& flight) {
@@ -64,7 +86,7 @@ class GatherTracer {
     if (texel != kNoTexel)
       sink_.texel(flight, texel);
     else if (flight.depth < lastDepth_)
-      leaveToShade(flight, hit);
+      leaveToShade(flight, hit, albedoAt(part, packet, lane, hit));
   }
 
   /// The sky's radiance for a ray that was gathered with density `pdf`. Precondition: environment.shines().
@@ -98,11 +120,16 @@ class GatherTracer {
     return {flight.key, static_cast<std::uint32_t>(flight.depth), 0u, 0u};
   }
 
-  void leaveToShade(const Flight& flight, const HitSurface& hit) {
-    Spot spot{flight, {hit.p, hit.ng, transport_.rays.shadingNormal(hit), transport_.rays.rayStart(hit)}};
-    const Vec3 albedo = transport_.materials.albedo(hit.point);
+  Vec3 albedoAt(std::uint32_t part, const RayPacket& packet, int lane, const HitSurface& hit) const {
+    if (!reflectance_.empty())
+      if (const std::uint32_t texel = map_.under(part, packet, lane); texel != kNoTexel) return reflectance_[texel];
+    return transport_.materials.albedo(hit.point);
+  }
+
+  void leaveToShade(const Flight& flight, const HitSurface& hit, const Vec3& albedo) {
     const float most = std::max({albedo.x, albedo.y, albedo.z});
     if (most == 0.0f) return;
+    Spot spot{flight, {hit.p, hit.ng, transport_.rays.shadingNormal(hit), transport_.rays.rayStart(hit)}};
     spot.flight.beta *= albedo;
     if (flight.depth >= kRouletteAfter) {
       const float survival = std::max(most, 0.05f);
@@ -147,12 +174,12 @@ class GatherTracer {
       ++rays_;
     }
     transport_.rays.intersect(packet, TraceMode::Packet);
-    for (int lane = 0; lane < kLanes; ++lane)
-      if (packet.valid[lane]) arrive(packet, lane, flights[static_cast<std::size_t>(lane)]);
+    arriveAll(packet, [&](int lane) -> const Flight& { return flights[static_cast<std::size_t>(lane)]; });
   }
 
   const LightTransport& transport_;
   const TexelMap& map_;
+  const std::span<const Vec3> reflectance_;
   const int lastDepth_;
   Sink& sink_;
   std::vector<Spot> spots_;

@@ -28,6 +28,7 @@ struct WarmSink {
   void texel(const Flight& flight, std::uint32_t texel) {
     links[flight.lane * GatherWave::kWarmRays + flight.sample] = {texel, packWeight(flight.beta)};
   }
+  void prefetch(std::uint32_t) const {}
   bool backFace(const Flight& flight) {
     ++texels[flight.lane].backFaces;
     return true;
@@ -167,10 +168,10 @@ GatherWave::GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t
   }
 }
 
-Vec3 GatherWave::reflectanceOf(const PlaceOnTriangle& place, float& opacity) const {
+/// The point on the primitive that the atlas's triangle comes from, which may be wound the other way round.
+TrianglePoint GatherWave::sourceOf(const PlaceOnTriangle& place) const {
   const Surface& surface = scene_.atlas.surfaces[place.triangle.surface];
   const Primitive* primitive = scene_.transport.rays.primitiveOf(surface.instance, surface.primitive);
-  // The source triangle may be wound the other way round.
   const std::uint32_t source = surface.sourceTriangle[place.triangle.triangle];
   const std::array<float, 3> weights = {1.0f - place.weights.x - place.weights.y, place.weights.x, place.weights.y};
   TrianglePoint at{primitive, source, Vec2(0.0f)};
@@ -180,18 +181,22 @@ Vec3 GatherWave::reflectanceOf(const PlaceOnTriangle& place, float& opacity) con
       if (primitive->indices[std::size_t{3} * source + static_cast<std::size_t>(i)] == surface.sourceVertex[vertex])
         at.barycentric[i - 1] = weights[k];
   }
-  opacity = scene_.transport.materials.opacity(at);
-  return scene_.transport.materials.albedo(at);
+  return at;
 }
 
 /// Of the points drawn, by area and where the surface is opaque.
 Vec3 GatherWave::meanReflectance(std::size_t lane) const {
+  const Materials& materials = scene_.transport.materials;
+  std::array<TrianglePoint, kWarmLights> points;
+  for (std::uint32_t i = 0; i < kWarmLights; ++i) {
+    points[i] = sourceOf(points_.place(lane, i));
+    materials.prefetchAlbedo(points[i]);
+  }
   Vec3 sum(0.0f);
   float opacities = 0.0f;
-  for (std::uint32_t i = 0; i < kWarmLights; ++i) {
-    float opacity = 0.0f;
-    const Vec3 albedo = reflectanceOf(points_.place(lane, i), opacity);
-    sum += albedo * opacity;
+  for (const TrianglePoint& at : points) {
+    const float opacity = materials.opacity(at);
+    sum += materials.albedo(at) * opacity;
     opacities += opacity;
   }
   return opacities > 0.0f ? sum / opacities : Vec3(0.0f);
@@ -230,7 +235,7 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   warmDirect(texels, counts);
 
   WarmSink sink{texels, links};
-  GatherTracer tracer(scene_.transport, scene_.map, scene_.lastDepth, sink);
+  GatherTracer tracer(scene_.transport, scene_.map, scene_.reflectance, scene_.lastDepth, sink);
   SampleLanes samples = lightSamples_;
   AimedRays& rays = packets_[0].rays;
   for (std::uint32_t s = 0; s < kWarmRays; ++s) {
@@ -240,14 +245,16 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
     // By the cosine every ray counts alike, so that no texel passes on more than it receives.
     aimCosineRays(u.x, u.y, from, rays);
     scene_.transport.rays.intersect(rays.packet, TraceMode::Packet);
-    for (std::size_t lane = 0; lane < count_; ++lane) {
-      if (!rays.packet.valid[lane]) continue;
+    for (std::size_t lane = count_; lane < kLanes; ++lane) rays.packet.valid[lane] = 0;
+    Flight flight;
+    tracer.arriveAll(rays.packet, [&](int lane) -> const Flight& {
+      const auto l = static_cast<std::size_t>(lane);
       ++counts.rays;
-      Flight flight = flightOf(lane, s, from, rays);
-      flight.key = samplers_[lane].seedOf(kWarmHits);
+      flight = flightOf(l, s, from, rays);
+      flight.key = samplers_[l].seedOf(kWarmHits);
       flight.beta = Vec3(1.0f);
-      tracer.arrive(rays.packet, static_cast<int>(lane), flight);
-    }
+      return flight;
+    });
   }
   tracer.finish();
   counts.rays += tracer.rays();
@@ -343,7 +350,7 @@ void GatherWave::sampleStrategy(std::size_t strategy, const NetRange& net,
 
 void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
   net_.fill(samplers_, covered_, net, kDirection);
-  GatherTracer tracer(scene_.transport, scene_.map, scene_.lastDepth, sink);
+  GatherTracer tracer(scene_.transport, scene_.map, scene_.reflectance, scene_.lastDepth, sink);
   const std::uint32_t count = net.count();
   // While one packet is traced, memory is asked for what those before it hit.
   for (std::uint32_t step = 0; step < count + kInFlight - 1; ++step) {

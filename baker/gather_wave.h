@@ -47,6 +47,7 @@ struct GatherScene {
   CacheLevels levels{};
   TraceMode gatherMode = TraceMode::Packet;
   std::vector<LightStrategy> strategies{};  // of the texels' own light
+  std::span<const Vec3> reflectance{};      // of the map's texels, once the warm-up has found it
 };
 
 /// Where a texel lies: in the open; partly inside of something; or wholly, where no light is gathered.
@@ -110,7 +111,7 @@ class GatherWave {
 
  private:
   Vec3 meanReflectance(std::size_t lane) const;
-  Vec3 reflectanceOf(const PlaceOnTriangle& place, float& opacity) const;
+  TrianglePoint sourceOf(const PlaceOnTriangle& place) const;
   void warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts);
   Flight flightOf(std::size_t lane, std::uint32_t sample, const PointLanes& from, const AimedRays& rays) const;
   void gatherLight(const NetRange& net, std::span<LightSpread> spreads, GatherSink& sink);

@@ -98,8 +98,12 @@ std::uint32_t TexelMap::texelBeside(const PageMap& page, const Vec2& pixel) cons
 }
 
 std::uint32_t TexelMap::find(std::uint32_t part, const RayPacket& packet, int lane) const {
+  return fromBehind(part, packet, lane) ? kNoTexel : under(part, packet, lane);
+}
+
+std::uint32_t TexelMap::under(std::uint32_t part, const RayPacket& packet, int lane) const {
   const std::int64_t first = parts_[part].firstTriangle;
-  if (first < 0 || fromBehind(part, packet, lane)) return kNoTexel;
+  if (first < 0) return kNoTexel;
   const RTCHit16& hit = packet.rayhit.hit;
   const Triangle& triangle = triangles_[static_cast<std::size_t>(first) + hit.primID[lane]];
   if (triangle.page == kNoTexel) return kNoTexel;

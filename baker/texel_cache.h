@@ -33,13 +33,22 @@ class TexelMap {
   /// its back was hit, or the point lies (by rounding) beside all texels of the page. Precondition: packet.hit(lane).
   std::uint32_t find(std::uint32_t part, const RayPacket& packet, int lane) const;
 
-  /// The same for all lanes of a packet, in three steps: each asks memory for what the next one reads, so that a caller
-  /// can do other work in between. The result is `texels`: kNoTexel also where nothing was hit, or something that
-  /// shines by itself.
+  /// The same from either side.
+  std::uint32_t under(std::uint32_t part, const RayPacket& packet, int lane) const;
+
+  /// The same as find for all lanes of a packet, in three steps: each asks memory for what the next one reads, so that
+  /// a caller can do other work in between. The result is `texels`: kNoTexel also where nothing was hit, or something
+  /// that shines by itself.
   struct Lookup;
   void findTriangles(const RayPacket& packet, Lookup& lookup) const;
   void findPixels(const RayPacket& packet, Lookup& lookup) const;
   void findTexels(Lookup& lookup) const;
+  /// All three, where there is no other work: the lanes at least wait for memory together.
+  void findAll(const RayPacket& packet, Lookup& lookup) const {
+    findTriangles(packet, lookup);
+    findPixels(packet, lookup);
+    findTexels(lookup);
+  }
 
   /// For each texel that is not `valid`: the nearest valid one of the same chart, within kReach texels; pairs of
   /// (texel, source) in the order of texels. Texels without such a neighbour are left out.

@@ -64,6 +64,14 @@ void WavePoints::addTexel(const RayScene& rays, const Atlas& atlas, const TexelF
   LUMEL_CHECK(pieces_.size() > firstPiece_[lane]);
 }
 
+void WavePoints::leaveOut(std::size_t lane) {
+  active_[lane] = 0;
+  for (SurfaceLanes& surface : surfaces_) {
+    surface.frame.set(lane, {Vec3(0.0f), Vec3(0.0f), Vec3(0.0f)});
+    surface.ng.set(lane, Vec3(0.0f));
+  }
+}
+
 bool WavePoints::turns(std::size_t lane) const {
   const auto same = [](const Frame& a, const Frame& b) { return a.t == b.t && a.b == b.b && a.n == b.n; };
   for (std::uint32_t i = firstSource_[lane]; i < firstSource_[lane + 1]; ++i) {

@@ -15,7 +15,7 @@
 namespace lumel {
 
 /// One point of every texel of a wave: a view into WavePoints, until it draws again. Lanes that are not active, without
-/// a texel or whose texel has no area, hold arbitrary points.
+/// a texel or whose texel has no area, hold frames and normals of zeros.
 struct PointLanes {
   const LaneFlags& active;
   const Vec3Lanes& p;
@@ -44,7 +44,7 @@ class WavePoints {
   double area(std::size_t lane) const { return areas_[lane]; }
   bool covered(std::size_t lane) const { return active_[lane] != 0; }
   /// From now on the lane is without a texel.
-  void leaveOut(std::size_t lane) { active_[lane] = 0; }
+  void leaveOut(std::size_t lane);
 
   /// Draws samples [first, first + count) of a pattern, count <= kMost a power of two: point i of every texel is its
   /// sample first + i, uniform over the texel's covered area.
