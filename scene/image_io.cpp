@@ -161,7 +161,8 @@ Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std
   static std::atomic<int> counter{0};
   const auto file = std::filesystem::temp_directory_path() /
                     ("lumel-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + "." + format);
-  if (writeBytes({name, file}, {&encoded, 1})) input = OIIO::ImageInput::open(file.string(), &config);
+  const std::string_view bytes(reinterpret_cast<const char*>(encoded.data()), encoded.size());
+  if (writeBytes({name, file}, bytes)) input = OIIO::ImageInput::open(file.string(), &config);
   auto result = input ? readOpened(*input, name, head) : unreadable(name, OIIO::geterror());
   std::error_code ec;
   std::filesystem::remove(file, ec);
