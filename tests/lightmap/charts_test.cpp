@@ -1,6 +1,8 @@
 // Shapes, and the number of charts that a person would cut them into.
 #include <gtest/gtest.h>
 
+#include <ostream>
+
 #include <cmath>
 
 #include "lightmap/atlas.h"
@@ -21,6 +23,9 @@ struct ShapeCase {
   double mostStretch = 1.25;  // but for the worst percent of the surface
 };
 
+/// For the names that test runners list.
+void PrintTo(const ShapeCase& shape, std::ostream* out) { *out << shape.name; }
+
 std::vector<ShapeCase> shapeCases() {
   std::vector<ShapeCase> cases;
   cases.push_back({"Cube", box(Vec3(0), Vec3(1)), 50, 6, 6});
@@ -31,9 +36,12 @@ std::vector<ShapeCase> shapeCases() {
   triangle.indices = {0, 1, 2};
   cases.push_back({"OneTriangle", triangle, 50, 1, 1});
   cases.push_back({"Cylinder", cylinder(32, 1, 3), 30, 3, 3});
-  cases.push_back({"HalfPipeOfFlatFaces", grid(12, 1, false, false, [](double u, double v) {
-    return Vec3(std::cos(std::numbers::pi * u), std::sin(std::numbers::pi * u), 4 * v);
-  }), 30, 1, 1});
+  cases.push_back({"HalfPipeOfFlatFaces",
+                   grid(12, 1, false, false,
+                        [](double u, double v) {
+                          return Vec3(std::cos(std::numbers::pi * u), std::sin(std::numbers::pi * u), 4 * v);
+                        }),
+                   30, 1, 1});
   // A person would cut bands around the tube; each chart may bend by its stretch limit.
   cases.push_back({"Torus", torus(64, 32), 20, 2, 8});
   cases.push_back({"Sphere", sphere(48, 24), 60, 2, 8, 2 * 48});
@@ -61,7 +69,8 @@ std::vector<ShapeCase> shapeCases() {
 }
 
 /// What holds for every atlas of these shapes.
-AtlasFigures expectSound(const AtlasResult& result, std::size_t triangles, std::size_t degenerate, double mostStretch = 1.25) {
+AtlasFigures expectSound(const AtlasResult& result, std::size_t triangles, std::size_t degenerate,
+                         double mostStretch = 1.25) {
   const AtlasFigures f = measureAtlas(result.atlas);
   EXPECT_EQ(f.triangles + degenerate, triangles);
   EXPECT_EQ(result.report.degenerateTriangles, degenerate);
@@ -90,11 +99,12 @@ TEST_P(Shapes, HaveTheChartsThatAPersonWouldChooseInAnyUnit) {
   EXPECT_LE(f.charts, shapeCase.mostCharts);
 }
 
-INSTANTIATE_TEST_SUITE_P(, Shapes, testing::Combine(testing::ValuesIn(shapeCases()), testing::Values(1.0f, 1e-4f, 1e6f)),
-                         [](const testing::TestParamInfo<Shapes::ParamType>& param) {
-                           const float scale = std::get<1>(param.param);
-                           return std::string(std::get<0>(param.param).name) + (scale < 1 ? "Tiny" : scale > 1 ? "Huge" : "");
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    , Shapes, testing::Combine(testing::ValuesIn(shapeCases()), testing::Values(1.0f, 1e-4f, 1e6f)),
+    [](const testing::TestParamInfo<Shapes::ParamType>& param) {
+      const float scale = std::get<1>(param.param);
+      return std::string(std::get<0>(param.param).name) + (scale < 1 ? "Tiny" : scale > 1 ? "Huge" : "");
+    });
 
 TEST(Charts, OfAFlatWallCoverItOnce) {
   const AtlasFigures f = measureAtlas(chartsOf(wallWithTJunctions().scene(), 30).atlas);
@@ -107,7 +117,8 @@ Shape lumpyTorus() {
   Shape s = grid(32, 16, true, true, [](double u, double v) {
     const double tube = 0.6 * (1 + 0.2 * std::sin(kTau * u + 0.3) + 0.1 * std::cos(kTau * (2 * u + v) + 1));
     const double r = 2 + tube * std::cos(kTau * v);
-    return Vec3(r * std::cos(kTau * u), 1.2 * r * std::sin(kTau * u), tube * std::sin(kTau * v) + 0.2 * std::sin(kTau * u + 2));
+    return Vec3(r * std::cos(kTau * u), 1.2 * r * std::sin(kTau * u),
+                tube * std::sin(kTau * v) + 0.2 * std::sin(kTau * u + 2));
   });
   smoothNormals(s);
   return s;
@@ -126,7 +137,8 @@ TEST_P(Scales, ChangeNothingButTheUnit) {
   EXPECT_EQ(scaled.atlas.charts.size(), charts);
 }
 
-INSTANTIATE_TEST_SUITE_P(, Scales, testing::Values(1e-4f, 1e-3f, 0.01f, 0.1f, 3.0f, 10.0f, 100.0f, 1e6f, 0x1p-13f, 0x1p20f));
+INSTANTIATE_TEST_SUITE_P(, Scales,
+                         testing::Values(1e-4f, 1e-3f, 0.01f, 0.1f, 3.0f, 10.0f, 100.0f, 1e6f, 0x1p-13f, 0x1p20f));
 
 TEST(Charts, BreakAtMirroredMaterialFramesOnly) {
   // Two coplanar squares, the right one with its texture mirrored.
