@@ -7,7 +7,7 @@ namespace lumel {
 namespace {
 
 /// Cost of a gather ray with all that follows, in light samples.
-constexpr float kGatherCost = 2.0f;
+constexpr float kGatherCost = 4.0f;
 /// Standard deviation, as a share of a texel's light, below which more light samples are not worth their time.
 constexpr float kSmoothEnough = 0.15f;
 /// The share of waves that see no difference and yet are crossed by an edge that they missed.
