@@ -105,6 +105,7 @@ void GatherIntegrator::dropCache() {
   levelSums_ = std::vector<Vec3>();
   spreads_ = std::vector<LightSpread>();
   substitutes_ = std::vector<TexelMap::Substitute>();
+  scene_.reflectance = {};
   map_.dropPixels();
 }
 

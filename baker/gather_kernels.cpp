@@ -51,6 +51,18 @@ LUMEL_FOR_EACH_CPU void aimCosineRays(const float* x, const float* y, const Poin
   aim(from, rays);
 }
 
+LUMEL_FOR_EACH_CPU int differentNeighbours(const RayPacket& packet) {
+  const RTCHit16& hit = packet.rayhit.hit;
+  int count = 0;
+  for (std::size_t lane = 0; lane + 1 < kLanes; ++lane) {
+    const bool differs = (hit.geomID[lane] != hit.geomID[lane + 1]) | (hit.primID[lane] != hit.primID[lane + 1]);
+    // The triangle of a ray that missed is what the lane found before.
+    const bool missed = (hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID) & (hit.geomID[lane + 1] == RTC_INVALID_GEOMETRY_ID);
+    count += (differs & !missed) ? 1 : 0;
+  }
+  return count;
+}
+
 LUMEL_FOR_EACH_CPU bool addLight(const Vec3Lanes& dirTangent, const Vec3Lanes& kernels, const Vec3Lanes& light,
                                  MapSums& sums) {
   alignas(64) float red[kLanes], green[kLanes], blue[kLanes];

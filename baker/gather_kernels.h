@@ -21,6 +21,9 @@ void aimGatherRays(const float* x, const float* y, const PointLanes& from, Aimed
 /// The same by the cosine; `pdf` is still the gather's, for the weight against light samples.
 void aimCosineRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays);
 
+/// How many rays of a traced packet found something else than the lane before theirs; 0 to kLanes - 1.
+int differentNeighbours(const RayPacket& packet);
+
 /// Sums of irradiance / pi over a few samples: of the flat map's three colours, then of those of the RNM maps.
 struct alignas(64) MapSums {
   float sum[12][kLanes] = {};

@@ -158,7 +158,8 @@ GatherWave::GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t
       page_(page),
       first_(first),
       count_(count),
-      points_(scene.transport.rays, scene.atlas, scene.texels[page], first, count) {
+      points_(scene.transport.rays, scene.atlas, scene.texels[page], first, count),
+      pilot_(scene.transport.rays) {
   for (std::size_t lane = 0; lane < count; ++lane) {
     const TexelCoord at = scene.texels[page].coords[first + lane];
     samplers_[lane] = TexelSampler(scene.seed, page, at.x, at.y);
@@ -379,9 +380,10 @@ void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
 
 /// Sends the rays of all lanes into one cell of the net. They share the number of their footprint point too: any 16
 /// neighbouring cells use all points of a texel.
-void GatherWave::launch(Packet& packet) const {
+void GatherWave::launch(Packet& packet) {
   aimGatherRays(net_.x(packet.cell), net_.y(packet.cell), points_[packet.cell], packet.rays);
-  scene_.transport.rays.intersect(packet.rays.packet, scene_.gatherMode);
+  scene_.transport.rays.intersect(packet.rays.packet, scene_.gatherMode.value_or(pilot_.mode()));
+  pilot_.see(packet.rays.packet);
   scene_.map.findTriangles(packet.rays.packet, packet.lookup);
 }
 

@@ -16,7 +16,7 @@
 
 namespace lumel {
 
-/// How a packet is traced. All answer alike but for ties and rounding: a bake uses one throughout for the same rays.
+/// How a packet is traced. All answer alike but for ties and rounding.
 /// Coherent is Embree's flag for rays that run close together, for closest hits alone: with ROBUST and AVX-512,
 /// Embree 3.13's rtcOccluded16 never returned for some packets that are coherent in name only (one ray with a direction
 /// component of -1e-16 was enough). rtcIntersect16 with the flag returns, but misses what it should hit where
@@ -26,7 +26,7 @@ enum class TraceMode {
   Single,    // one call per ray: the plain way, kept as the yardstick
   Packet,    // 16 rays per call
   Coherent,  // the same, for closest hits of rays that run close together; no component nearer to zero than 1e-12,
-             // and no instances that Embree places: in their space a direction may have any. Benchmarks use it alone
+             // and no instances that Embree places: in their space a direction may have any
 };
 
 /// Up to 16 rays that look for their closest hit. Lanes that are not set are not traced.
@@ -138,6 +138,11 @@ class RayScene {
   /// For offsetPoint: the largest coordinate of an instance's translation where Embree places it, 0 where its
   /// triangles are in world space.
   float translationOf(int instance) const;
+
+  /// Whether Embree places any mesh: TraceMode::Coherent is then not allowed.
+  bool placesInstances() const {
+    return std::any_of(meshScenes_.begin(), meshScenes_.end(), [](const EmbreeScene& s) { return s != nullptr; });
+  }
 
   Vec3 boundsMin() const { return boundsMin_; }
   Vec3 boundsMax() const { return boundsMax_; }

@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "baker/gather_wave.h"
 #include "baker/sampling.h"
 #include "baker/sobol.h"
 #include "tests/baker/test_scene.h"
@@ -281,6 +282,86 @@ TEST(RayScene, OffsetStartsClearTheirSurface) {
       }
       EXPECT_EQ(selfHits, 0) << "place " << place << " size " << size << (copies == 1 ? " flattened" : " instanced");
     }
+}
+
+/// Gather rays from a spot of (x, z) on the ground, `width` across.
+AimedRays aimed(const Vec3& from, float width, std::uint32_t seed) {
+  const LaneFlags active{};
+  Vec3Lanes p, ng;
+  FrameLanes frame;
+  float x[kLanes], y[kLanes];
+  for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
+    const Vec2 u = sobol2D(lane, seed);
+    x[lane] = u.x * width;
+    y[lane] = u.y * width;
+    p.set(lane, from + Vec3(0.01f * u.x, 0, 0.01f * u.y));
+    ng.set(lane, {0, 1, 0});
+    frame.set(lane, {{1, 0, 0}, {0, 0, -1}, {0, 1, 0}});
+  }
+  AimedRays rays;
+  aimGatherRays(x, y, {active, p, p, frame, ng}, rays);
+  return rays;
+}
+
+// Whatever the packets: rays close together and all over, in a room with 48 loose triangles.
+TEST(RayScene, CoherentPacketsFindTheSame) {
+  TestScene test;
+  test.addRoom({-2, -1, -2}, {2, 3, 2});
+  for (int i = 0; i < 24; ++i)
+    test.addRectangle(3.0f * randomDirection(static_cast<std::uint32_t>(i), 5), {0.5f, 0.1f, 0}, {0, 0.4f, 0.3f});
+  const Built built(test.scene);
+  int hits = 0;
+  for (std::uint32_t i = 0; i < 400; ++i) {
+    AimedRays plain = aimed(0.9f * randomDirection(i, 6), i % 2 == 0 ? 0.05f : 1.0f, i);
+    AimedRays coherent = plain;
+    built.rays->intersect(plain.packet, TraceMode::Packet);
+    built.rays->intersect(coherent.packet, TraceMode::Coherent);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      ASSERT_EQ(plain.packet.hit(lane), coherent.packet.hit(lane));
+      if (!plain.packet.hit(lane)) continue;
+      ++hits;
+      EXPECT_EQ(plain.packet.rayhit.ray.tfar[lane], coherent.packet.rayhit.ray.tfar[lane]);
+    }
+  }
+  EXPECT_GT(hits, 5000);
+}
+
+TEST(CoherencePilot, CoherentWhereRaysFindTheSameTriangles) {
+  TestScene test;
+  test.addRectangle({-9, 1, -9}, {18, 0, 0}, {0, 0, 18});
+  const Built wall(test.scene);
+  CoherencePilot pilot(*wall.rays);
+  EXPECT_EQ(pilot.mode(), TraceMode::Packet);  // nothing is known yet
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    AimedRays rays = aimed({3, 0, -2}, 0.05f, i);
+    wall.rays->intersect(rays.packet, TraceMode::Packet);
+    pilot.see(rays.packet);
+  }
+  EXPECT_EQ(pilot.mode(), TraceMode::Coherent);
+
+  TestScene many;
+  for (int i = 0; i < 40; ++i)
+    for (int k = 0; k < 40; ++k)
+      many.addRectangle({0.25f * static_cast<float>(i) - 5, 1, 0.25f * static_cast<float>(k) - 5}, {0.25f, 0, 0}, {0, 0, 0.25f});
+  const Built tiles(many.scene);
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    AimedRays rays = aimed({0, 0, 0}, 0.9f, i);
+    tiles.rays->intersect(rays.packet, TraceMode::Packet);
+    pilot.see(rays.packet);
+  }
+  EXPECT_EQ(pilot.mode(), TraceMode::Packet);
+}
+
+TEST(CoherencePilot, NeverWithInstances) {
+  TestScene test;
+  test.addRectangle({-9, 1, -9}, {18, 0, 0}, {0, 0, 18});
+  EXPECT_FALSE(Built(test.scene).rays->placesInstances());
+  test.addInstance(0, Mat4(2.0f));
+  const Built built(test.scene);
+  EXPECT_TRUE(built.rays->placesInstances());
+  CoherencePilot pilot(*built.rays);
+  for (std::uint32_t i = 0; i < 8; ++i) pilot.see(RayPacket());
+  EXPECT_EQ(pilot.mode(), TraceMode::Packet);
 }
 
 }  // namespace

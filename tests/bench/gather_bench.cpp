@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <functional>
 #include <map>
+#include <optional>
 
 #include "baker/gather_wave.h"
 #include "tests/bench/gather_scenes.h"
@@ -28,6 +29,14 @@ constexpr std::uint32_t kPoints = WavePoints::kMost;
 constexpr std::array<TexelPlace, kLanes> kOpen{};
 
 enum Place : int { Rooms, Foliage };
+
+/// When packets are traced coherently; bakes ask the pilot.
+enum Coherent : int { kNever, kAlways, kByPilot };
+
+std::optional<TraceMode> modeOf(std::int64_t coherent) {
+  if (coherent == kByPilot) return {};
+  return coherent == kAlways ? TraceMode::Coherent : TraceMode::Packet;
+}
 
 /// A scene ready to gather in, its cache filled with arbitrary light.
 struct Fixture {
@@ -162,7 +171,7 @@ double traceNaively(const Fixture& f, std::size_t texel, std::uint32_t samples) 
 }
 
 /// Seconds in Embree alone for the packets of one wave.
-double tracePackets(const Fixture& f, std::size_t first, std::uint32_t samples, TraceMode mode) {
+double tracePackets(const Fixture& f, std::size_t first, std::uint32_t samples, std::optional<TraceMode> mode) {
   const PageTexels& page = f.transport.texels[0];
   WavePoints points(*f.transport.rays, f.grid.atlas, page, first, kLanes);
   std::array<TexelSampler, kLanes> samplers;
@@ -184,8 +193,12 @@ double tracePackets(const Fixture& f, std::size_t first, std::uint32_t samples, 
     }
     s += net.count();
   }
+  CoherencePilot pilot(*f.transport.rays);
   const double start = cpuSeconds();
-  for (AimedRays& rays : packets) f.transport.rays->intersect(rays.packet, mode);
+  for (AimedRays& rays : packets) {
+    f.transport.rays->intersect(rays.packet, mode.value_or(pilot.mode()));
+    if (!mode) pilot.see(rays.packet);
+  }
   return cpuSeconds() - start;
 }
 
@@ -195,7 +208,8 @@ double median(std::vector<double> values) {
 }
 
 /// Naive loop and gather in turns over the same waves; medians over rounds.
-void compare(benchmark::State& state, int place, std::uint32_t samples, TraceMode mode, std::size_t waves, int rounds) {
+void compare(benchmark::State& state, int place, std::uint32_t samples, std::optional<TraceMode> mode, std::size_t waves,
+             int rounds) {
   const Fixture& f = fixture(place);
   GatherScene scene = f.scene;
   scene.gatherMode = mode;
@@ -236,11 +250,11 @@ void compare(benchmark::State& state, int place, std::uint32_t samples, TraceMod
 
 void speedup(benchmark::State& state) {
   compare(state, static_cast<int>(state.range(0)), static_cast<std::uint32_t>(state.range(1)),
-          state.range(2) != 0 ? TraceMode::Coherent : TraceMode::Packet, 64, 5);
+          modeOf(state.range(2)), 64, 5);
 }
 BENCHMARK(speedup)
     ->ArgNames({"foliage", "rays", "coherent"})
-    ->ArgsProduct({{Rooms, Foliage}, {64, 256, 1024}, {0, 1}})
+    ->ArgsProduct({{Rooms, Foliage}, {64, 256, 1024}, {kNever, kAlways, kByPilot}})
     ->Iterations(1)
     ->Unit(benchmark::kSecond);
 
@@ -260,9 +274,9 @@ void gather(benchmark::State& state) {
 BENCHMARK(gather)->ArgNames({"foliage", "rays"})->ArgsProduct({{Rooms, Foliage}, {16, 64, 256}})->Unit(benchmark::kMillisecond);
 
 void smoke(benchmark::State& state) {
-  compare(state, Rooms, 16, state.range(0) != 0 ? TraceMode::Coherent : TraceMode::Packet, 2, 1);
+  compare(state, Rooms, 16, modeOf(state.range(0)), 2, 1);
 }
-BENCHMARK(smoke)->ArgName("coherent")->Arg(0)->Arg(1)->Iterations(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(smoke)->ArgName("coherent")->Arg(kNever)->Arg(kAlways)->Arg(kByPilot)->Iterations(1)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace lumel
