@@ -176,6 +176,7 @@ Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const R
   const GatherOptions gatherOptions{.samples = std::max(1, options.samples),
                                     .maxSamples = options.maxSamples,
                                     .bounces = options.bounces,
+                                    .indirectOnly = options.indirectOnly,
                                     .seed = options.seed,
                                     .targetError = options.targetError,
                                     .timeBudgetSeconds = static_cast<double>(options.timeBudgetSeconds)};
@@ -218,13 +219,7 @@ using WaveMeans = std::array<std::array<float, kLanes>, kMarks.size()>;
 void storePathErrors(const std::vector<Wave>& waves, const std::vector<WaveMeans>& means, int samples,
                      const std::vector<PageTexels>& texels, std::vector<BakedPage>& pages,
                      std::vector<WaveStats>& stats) {
-  std::vector<std::uint32_t> counts;
-  std::vector<std::uint32_t> pageOf;
-  for (const Wave& wave : waves) {
-    counts.push_back(static_cast<std::uint32_t>(wave.count));
-    pageOf.push_back(wave.page);
-  }
-  DoublingError errors(counts, pageOf, kPathCredit);
+  DoublingError errors(texels, kPathCredit);
   const std::vector<std::uint8_t> live(waves.size(), 1);
   for (std::size_t m = 0; m < kMarks.size(); ++m) {
     const auto samplesAt = [samples](int mark) {
@@ -254,6 +249,7 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
   const PathIntegrator integrator(transport, kernels, atlas,
                                   {.samples = std::max(1, options.samples),
                                    .bounces = options.bounces < 0 ? kLongestPath : options.bounces,
+                                   .indirectOnly = options.indirectOnly,
                                    .seed = options.seed});
   pages.resize(atlas.pages.size());
   for (std::size_t p = 0; p < pages.size(); ++p) {

@@ -36,6 +36,7 @@ struct BakeOptions {
   // Gather alone: no pass is begun that would end later than this; 0: none. The only option whose result depends on
   // the machine.
   float timeBudgetSeconds = 0.0f;
+  bool indirectOnly = false;  // without what arrives straight from lights, shining surfaces and the sky
   std::uint64_t seed = 1;
   Projection projection = Projection::Flat;
 };

@@ -61,6 +61,9 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
                  "depends on the machine");
   options.integerOrWord("bounces", a.bake.bounces, {0, 1024}, "all", kAllBounces,
                         "Indirect bounces; 0: direct light only, all: as many as matter");
+  options.flag("indirect-only", a.bake.indirectOnly,
+               "Leave out light that comes straight from lights, shining surfaces and the sky: the program that shows "
+               "the scene adds it");
   declareSkyAndSides(options, a);
   options.choice("projection", a.bake.projection, {"raw", "flat", "fit"},
                  "How light is spread over the three maps: as in the literature (raw), scaled so that a flat normal is "

@@ -2,24 +2,54 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "scene/check.h"
+#include "baker/lanes.h"
 #include "scene/parallel.h"
 
 namespace lumel {
+namespace {
 
-DoublingError::DoublingError(std::span<const std::uint32_t> runLengths, std::span<const std::uint32_t> groups,
-                             double credit)
-    : credit_(credit) {
-  LUMEL_CHECK(runLengths.size() == groups.size());
-  std::size_t texels = 0;
-  runs_.reserve(runLengths.size());
-  for (std::size_t r = 0; r < runLengths.size(); ++r) {
-    runs_.push_back({.first = texels, .count = runLengths[r], .group = groups[r]});
-    texels += runLengths[r];
+constexpr int kTile = 4;  // side of the tiles that PageTexels are ordered by
+
+}  // namespace
+
+DoublingError::DoublingError(const std::vector<PageTexels>& pages, double credit) : credit_(credit) {
+  for (const PageTexels& page : pages) addPage(page);
+  squares_.resize(runs_.empty() ? 0 : runs_.back().first + runs_.back().count);
+  sums_.resize(squares_.size());
+}
+
+/// A run belongs to the tile of its middle texel; runs in the tiles around it are its neighbours.
+void DoublingError::addPage(const PageTexels& page) {
+  const int tilesX = (page.width + kTile - 1) / kTile;
+  const int tilesY = (page.height + kTile - 1) / kTile;
+  std::vector<std::uint32_t> runOf(static_cast<std::size_t>(tilesX) * static_cast<std::size_t>(tilesY), kNone);
+  const std::size_t firstRun = runs_.size();
+  std::size_t texel = runs_.empty() ? 0 : runs_.back().first + runs_.back().count;
+  const auto tileOf = [&](std::size_t first, std::size_t count) {
+    const TexelCoord at = page.coords[first + count / 2];
+    return std::pair(static_cast<int>(at.x) / kTile, static_cast<int>(at.y) / kTile);
+  };
+  const auto indexOf = [&](int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(tilesX) + static_cast<std::size_t>(x);
+  };
+  for (std::size_t first = 0; first < page.size(); first += kLanes) {
+    const std::size_t count = std::min<std::size_t>(kLanes, page.size() - first);
+    const auto [x, y] = tileOf(first, count);
+    runOf[indexOf(x, y)] = static_cast<std::uint32_t>(runs_.size());
+    runs_.push_back({.first = texel, .count = static_cast<std::uint32_t>(count)});
+    texel += count;
   }
-  squares_.resize(texels);
-  sums_.resize(texels);
+  around_.resize(runs_.size());
+  for (std::size_t r = firstRun; r < runs_.size(); ++r) {
+    const auto [tileX, tileY] = tileOf((r - firstRun) * kLanes, runs_[r].count);
+    auto next = around_[r].begin();
+    for (int y = tileY - 1; y <= tileY + 1; ++y)
+      for (int x = tileX - 1; x <= tileX + 1; ++x)
+        *next++ = x >= 0 && y >= 0 && x < tilesX && y < tilesY ? runOf[indexOf(x, y)] : kNone;
+    around_[r][4] = static_cast<std::uint32_t>(r);
+  }
 }
 
 void DoublingError::add(std::size_t index, std::span<const float> before, std::span<const float> now, std::uint32_t n0,
@@ -70,13 +100,11 @@ void DoublingError::endPass(const std::vector<std::uint8_t>& live) {
 
 double DoublingError::poolAround(std::size_t index) const {
   const Run& run = runs_[index];
-  const std::size_t least = index - std::min(index, kReach);
-  const std::size_t most = std::min(runs_.size() - 1, index + kReach);
   double pooled = 0.0;
   double texels = 0.0;
-  for (std::size_t r = least; r <= most; ++r) {
+  for (const std::uint32_t r : around_[index]) {
+    if (r == kNone || runs_[r].doublings == 0) continue;
     const Run& near = runs_[r];
-    if (near.group != run.group || near.doublings == 0) continue;
     // A run that was done earlier has fewer samples.
     const double fall =
         near.samples == run.samples ? 1.0 : std::pow(static_cast<double>(near.samples) / run.samples, rate_);

@@ -1,14 +1,18 @@
 // The standard error of texels whose samples are doubled again and again, from how far their means move.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "lightmap/texels.h"
+
 namespace lumel {
 
-/// Texels in runs of neighbours (waves), which have the same number of samples and are judged together.
+/// Texels of pages in runs of kLanes in their order (waves), which have the same number of samples and are judged
+/// together. A run never spans pages.
 ///
 /// When n samples become 2n let d be half the difference between the means of the two halves. If the halves were
 /// independent E[d^2] would be the variance of the mean of all. Those of an Owen-scrambled sequence are better than
@@ -19,16 +23,15 @@ namespace lumel {
 /// distribution's. The credit is a calibration; with it 93 to 97% of texels lie within 1.96 standard errors (README).
 ///
 /// One d^2 is hardly an estimate, so others join: the texel's earlier doublings, scaled to the
-/// present by the rate; the texels of the kReach runs on either side, which count as much as kPrior doublings.
+/// present by the rate; the texels of its run and of those around it on the page, which count as much as kPrior
+/// doublings.
 /// Measured (four scenes, 32 to 1024 samples): baker/README.md.
 class DoublingError {
  public:
-  static constexpr std::size_t kReach = 4;
   static constexpr double kPrior = 3.0;
 
-  /// `runLengths`: texels of each run; texels are numbered through. Runs of one `group` (a page) are
-  /// neighbours. `credit`: 0 to 1.
-  DoublingError(std::span<const std::uint32_t> runLengths, std::span<const std::uint32_t> groups, double credit);
+  /// `credit`: 0 to 1. Runs are numbered through.
+  DoublingError(const std::vector<PageTexels>& pages, double credit);
 
   /// The means of a run's texels were `before` from n0 samples and are `now` from n1 more as well. Runs may be called
   /// from several threads at once.
@@ -39,13 +42,15 @@ class DoublingError {
 
   /// Of the mean over all samples of the run's texel `i`; 0 before the first doubling.
   float standardError(std::size_t run, std::size_t i) const;
+  /// The runs in a run's tile and in the eight around it; kNone where there is none.
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+  const std::array<std::uint32_t, 9>& around(std::size_t run) const { return around_[run]; }
   double rate() const { return rate_; }
 
  private:
   struct Run {
     std::size_t first = 0;
     std::uint32_t count = 0;
-    std::uint32_t group = 0;
     std::uint32_t samples = 0;
     std::uint32_t samplesBefore = 0;
     int doublings = 0;
@@ -55,9 +60,11 @@ class DoublingError {
     double pool = 0.0;        // the same of the neighbourhood
     double factor = 1.0;      // variance / mean d^2
   };
+  void addPage(const PageTexels& page);
   double poolAround(std::size_t run) const;
 
   std::vector<Run> runs_;
+  std::vector<std::array<std::uint32_t, 9>> around_;
   std::vector<float> squares_;  // of the last pass: d^2
   std::vector<float> sums_;     // of d^2 over all passes, each scaled to the samples of the last
   double credit_;

@@ -20,6 +20,7 @@ struct GatherOptions {
   int samples = 1;     // per texel; with a time budget the most, with a target error the least
   int maxSamples = 1;  // with a target error: the most
   int bounces = -1;    // indirect bounces; negative: all that matter
+  bool indirectOnly = false;
   std::uint64_t seed = 1;
   float targetError = 0.0f;        // relative standard error at which a wave of texels is done; 0: none
   double timeBudgetSeconds = 0.0;  // no pass is begun that would probably end later; 0: none
@@ -144,6 +145,9 @@ class GatherIntegrator {
   TexelLight sums_;  // over all samples so far
   std::vector<Vec3> levelSums_;  // levels.count per texel, unless endless
   std::vector<Vec3> reflectance_;
+  // Of the cache alone, with indirectOnly: light from light samples; sums of what the rays of all passes saw shine.
+  std::vector<Vec3> direct_;
+  std::vector<Vec3> seen_;
   std::vector<Vec3> cache_;  // levels.count per texel
   std::vector<float> coverage_;
   std::vector<std::uint32_t> backFaces_;

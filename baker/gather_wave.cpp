@@ -63,6 +63,9 @@ struct GatherSink {
   void tally(std::size_t lane, const Vec3& dirTangent, const Vec3& light) {
     if (tallied) rays.add(lane, luminance(light) * std::max(0.0f, dirTangent.z));
   }
+  void addSeen(std::size_t lane, const Vec3& dirTangent, const Vec3& light) {
+    result.texels[lane].seen += Vec3d(light * std::max(0.0f, dirTangent.z));
+  }
   void addProbes(std::size_t lane, const Vec3& dirTangent, const Vec3& light) {
     for (std::size_t i = 0; i < kProbeNormals; ++i)
       result.texels[lane].probes[i] += Vec3d(light * std::max(0.0f, glm::dot(dirTangent, probeNormals()[i])));
@@ -110,6 +113,7 @@ struct GatherSink {
   void light(const Flight& flight, const Vec3& radiance, int depth) {
     const Vec3 light = flight.beta * radiance;
     if (!isFinite(light)) return report(flight.lane, flight.sample);
+    if (depth == 0 && scene.indirectOnly) return addSeen(flight.lane, flight.dirTangent, light);
     tally(flight.lane, flight.dirTangent, light);
     addToMaps(flight.lane, flight.dirTangent, light);
     addToLevels(flight.lane, flight.dirTangent, light, depth);
@@ -405,7 +409,13 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
                     flightOf(lane, net_.sample(packet.cell, lane), points_[packet.cell], rays));
     } else if (shines) {
       light.set(lane, beta * tracer.skyTowards(rays.packet.direction(static_cast<int>(lane)), rays.pdf[lane]));
-      if (isFinite(light[lane])) sink.addToLevels(lane, rays.dirTangent[lane], light[lane], 0);
+      if (!isFinite(light[lane])) continue;
+      if (scene_.indirectOnly) {
+        sink.addSeen(lane, rays.dirTangent[lane], light[lane]);
+        light.set(lane, Vec3(0.0f));
+      } else {
+        sink.addToLevels(lane, rays.dirTangent[lane], light[lane], 0);
+      }
     }
   }
   if (sink.tallied)

@@ -46,6 +46,7 @@ struct GatherScene {
   int bounces = 0;    // of the result; with endless levels unused
   int lastDepth = 0;  // GatherTracer
   CacheLevels levels{};
+  bool indirectOnly = false;
   std::optional<TraceMode> gatherMode{};  // of the texels' rays; else as CoherencePilot says
   std::vector<LightStrategy> strategies{};  // of the texels' own light
   std::span<const Vec3> reflectance{};      // of the map's texels, once the warm-up has found it
@@ -78,6 +79,7 @@ struct GatheredTexel {
   std::array<Vec3d, 3> rnm{Vec3d(0), Vec3d(0), Vec3d(0)};
   std::array<Vec3d, CacheLevels::kMost> levels{};  // flat light of the cache's levels, unless endless
   std::array<Vec3d, kProbeNormals> probes{};       // where the texel is probed
+  Vec3d seen{0};  // with GatherScene::indirectOnly: flat light from what rays see shine by itself, not in the maps
   std::uint32_t backFaces = 0;
 };
 

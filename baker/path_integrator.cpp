@@ -53,6 +53,8 @@ class WaveTracer {
   void addLight(int lane, const Vec3& dirTangent, const Vec3& radianceOverPdf);
   void finishSample();
   Vec3 rayStart(const SurfacePoint& point) const;
+  /// Whether what shines by itself does not count for a ray.
+  bool leavesOut(int depth) const { return depth == 0 && options_.indirectOnly; }
 
   const LightTransport& transport_;
   const RnmKernels& kernels_;
@@ -84,7 +86,7 @@ WaveResult WaveTracer::run(std::uint32_t pageIndex, const PageTexels& page, std:
       for (std::size_t lane = 0; lane < kLanes; ++lane)
         samples_.setSample(static_cast<int>(lane), options_.stratumOrder ? net_.sample(step, lane) : begin + step);
       startSample();
-      lightTexels();
+      if (!options_.indirectOnly) lightTexels();
       followPaths();
       finishSample();
     }
@@ -205,7 +207,7 @@ bool WaveTracer::shadeHit(int lane, int depth) {
   Path& path = paths_[l];
   if (!rays_.hit(lane)) {
     if (depth == 0) result_.texels[l].sums.countGatherRay(false);
-    if (!transport_.environment.shines()) return false;
+    if (!transport_.environment.shines() || leavesOut(depth)) return false;
     const RTCRay16& ray = rays_.rayhit.ray;
     const Vec3 dir(ray.dir_x[lane], ray.dir_y[lane], ray.dir_z[lane]);
     path.radiance +=
@@ -216,7 +218,7 @@ bool WaveTracer::shadeHit(int lane, int depth) {
   if (depth == 0)
     result_.texels[l].sums.countGatherRay(hit.backFace && !transport_.materials.material(hit.material).doubleSided);
   const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
-  if (emitted != Vec3(0.0f))
+  if (emitted != Vec3(0.0f) && !leavesOut(depth))
     path.radiance += path.beta * emitted * misWeight(path.pdf, transport_.emissive.pdf(hit, path.origin));
   if (depth == lastDepth_) return false;
   path.beta *= transport_.materials.albedo(hit.point);

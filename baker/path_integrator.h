@@ -17,6 +17,7 @@ namespace lumel {
 struct PathOptions {
   int samples = 1;
   int bounces = 0;
+  bool indirectOnly = false;
   std::uint64_t seed = 1;
   bool stratumOrder = true;                  // take samples by cell (NetLanes): the same samples, faster rays
   TraceMode gatherMode = TraceMode::Packet;  // rays and shadow rays from texels

@@ -221,6 +221,32 @@ TEST(Gather, SurfacesWithoutTexels) {
   }
 }
 
+// What the program that shows a scene adds itself is left out, with either integrator, and nothing else.
+TEST(Gather, IndirectOnlyIsAllLightLessTheDirect) {
+  TestScene test = busyRoom();
+  for (const int bounces : {0, 2, kAllBounces}) {
+    const auto mean = [&](Integrator integrator, const BakeOptions& options) {
+      test.integrator = integrator;
+      return meanOf(test.bake(options));
+    };
+    const BakeOptions all{.samples = 256, .bounces = bounces};
+    BakeOptions direct = all, indirect = all;
+    direct.bounces = 0;
+    indirect.indirectOnly = true;
+    // A path takes the same samples, whatever of it counts.
+    const double path = mean(Integrator::Path, indirect);
+    const double total = mean(Integrator::Path, all);
+    EXPECT_NEAR(path, total - mean(Integrator::Path, direct), 1e-5 * total) << bounces;
+    // Noise of 256 paths, and the gather's bias.
+    EXPECT_NEAR(mean(Integrator::Gather, indirect), path, 0.02 * path) << bounces;
+    if (bounces == 0) {
+      EXPECT_EQ(path, 0.0);
+    } else {
+      EXPECT_GT(path, 0.1 * total);
+    }
+  }
+}
+
 bool sameBytes(const Image& a, const Image& b) {
   return a.pixels.size() == b.pixels.size() &&
          std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(float)) == 0;

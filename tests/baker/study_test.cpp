@@ -75,8 +75,9 @@ TEST(Study, TheReferenceKnowsItsError) {
   EXPECT_LT(study.reference.flatError, path.back()->flat.rmse / std::sqrt(32.0) * 1.1);
   EXPECT_GT(study.reference.flatError, path.back()->flat.rmse / 32.0);
   EXPECT_GT(study.reference.rnmError, study.reference.flatError);
-  // Noise that all texels share through the gather's cache shows as a bias of the mean: in this room of 770 texels it was
-  // -0.8, -0.1 and -0.2% with 64 samples of three seeds.
+  // Noise that all texels share through the gather's cache shows as a bias of the mean. It falls with the number of
+  // texels: +0.3% with 64 samples where lumel_bench_gather has 7.5 thousand, and -0.8, -0.1 and -0.2% with three seeds in
+  // this room of 770. The bound is four such deviations.
   for (const StudyPoint& p : study.points)
     if (p.hasMaps && p.series != "denoised" && p.samples == 64) {
       EXPECT_LT(std::abs(p.flat.bias), 0.02) << p.series;

@@ -135,7 +135,7 @@ GridScene foliage() {
   return made;
 }
 
-GridScene cornellBox() {
+GridScene cornellBox(bool empty) {
   GridScene made(128);
   const int white = made.addMaterial(Vec3(0.73f, 0.73f, 0.73f));
   const int red = made.addMaterial({0.63f, 0.06f, 0.05f});
@@ -148,6 +148,7 @@ GridScene cornellBox() {
   made.addGrid({0, 0, 0}, {0, 1, 0}, {0, 0, 1}, 1, kWall, red);
   made.addGrid({1, 1, 1}, {0, 0, -1}, {0, -1, 0}, 1, kWall, green);
   made.addGrid({0.4f, 0.995f, 0.4f}, {0.2f, 0, 0}, {0, 0, 0.2f}, 1, 4, lamp);
+  if (empty) return made;
   const auto block = [&](const Vec3& size, const Vec3& at, float turn) {
     const float c = std::cos(turn), s = std::sin(turn);
     const Vec3 x = size.x * Vec3(c, 0, -s), z = size.z * Vec3(s, 0, c), y(0, size.y, 0);
@@ -183,7 +184,7 @@ GridScene twoRooms() {
   for (const bool first : {true, false}) {
     const float x = first ? 4.0f : 4 + kThick;
     const auto wall = [&](const Vec3& corner, const Vec3& along, const Vec3& up, int texels) {
-      made.addGrid(corner, first ? up : along, first ? along : up, 1, texels, white);
+      made.addGrid(corner, first ? along : up, first ? up : along, 1, texels, white);
     };
     wall({x, 0, 0}, {0, 0, left}, {0, kHeight, 0}, 20);
     wall({x, 0, right}, {0, 0, left}, {0, kHeight, 0}, 20);

@@ -32,8 +32,8 @@ struct GridScene {
 GridScene furnishedRooms();
 /// The same with 48 thousand leaf quads in the air (each leaf has two sides), 445 thousand triangles.
 GridScene foliage();
-/// A Cornell box, 7.5 thousand texels: a lamp at the ceiling, two boxes, red and green walls.
-GridScene cornellBox();
+/// A Cornell box, 7.5 thousand texels: a lamp at the ceiling, two blocks unless it is empty, red and green walls.
+GridScene cornellBox(bool empty = false);
 /// Two rooms joined by a door, a lamp in one of them.
 GridScene twoRooms();
 

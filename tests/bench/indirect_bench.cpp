@@ -1,17 +1,19 @@
 // How many rays indirect light takes to a given error: the gather against path tracing with the same sampler.
-//   lumel_bench_gather --benchmark_filter=indirect/door:0     Cornell box
-//   lumel_bench_gather --benchmark_filter=indirect/door:1     two rooms joined by a door; errors in the room without lamp
-// Indirect light is a bake less its direct light with the same samples, so that the noise of the direct light cancels.
-// All rays of the whole bake count: warm-up, gather, paths, shadows. Errors are relative: RMSE over texels by their mean.
+//   lumel_bench_gather --benchmark_filter=indirect/cornell    7.5 thousand texels
+//   lumel_bench_gather --benchmark_filter=indirect/rooms      two rooms joined by a door
+//   lumel_bench_gather --benchmark_filter=indirect/dark_room  the same, errors in the room without lamp
+// Indirect light alone is baked (BakeOptions::indirectOnly). All rays count that it takes: the gather's direct map and
+// warm-up, gather rays, paths, shadows. Errors are of luminance, relative: RMSE over texels by their mean.
 // Truth: two path-traced references A and B that are independent of each other and of the candidate X, so that
 // mean((X - A)(X - B)) is X's mean squared error whatever the noise of A and B.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
-#include <utility>
+#include <string>
 #include <vector>
 
 #include "baker/bake.h"
+#include "baker/finish.h"
 #include "scene/check.h"
 #include "tests/bench/gather_scenes.h"
 
@@ -25,25 +27,34 @@ struct Indirect {
   double raysPerTexel = 0;    // over all texels
 };
 
+enum class Where { Cornell, EmptyBox, Rooms, DarkRoom };
+
+GridScene sceneOf(Where where) {
+  if (where == Where::Rooms || where == Where::DarkRoom) return twoRooms();
+  return cornellBox(where == Where::EmptyBox);
+}
+
 class Study {
  public:
-  explicit Study(bool door) : made_(door ? twoRooms() : cornellBox()), door_(door), texels_(findTexels(made_.atlas)) {
-    validity_ = run({.samples = 64, .bounces = 0, .seed = 5}).pages[0].aux;
+  explicit Study(Where where) : made_(sceneOf(where)), texels_(findTexels(made_.atlas)) {
+    const Image validity = run({.samples = 64, .bounces = 0, .seed = 5}).pages[0].aux;
+    // Texels inside of things hold nothing of use, and at their edge path tracing counts what lies inside.
+    for (std::size_t i = 0; i < texels_[0].size(); ++i)
+      if (const TexelCoord at = texels_[0].coords[i];
+          validity.at(at.x, at.y)[1] >= 0.99f && (where != Where::DarkRoom || isDark(i)))
+        counting_.push_back(at);
   }
 
-  Indirect measure(Integrator integrator, int samples, std::uint64_t seed) const {
-    BakeOptions options{.samples = samples, .bounces = kAllBounces, .seed = seed};
+  Indirect measure(Integrator integrator, int samples, std::uint64_t seed, bool denoise = false) const {
+    BakeOptions options{.samples = samples, .bounces = kAllBounces, .indirectOnly = true, .seed = seed};
     options.integrator = integrator;
-    const BakeResult all = run(options);
-    options.bounces = 0;
-    const BakeResult direct = run(options);
+    BakeResult baked = run(options);
+    if (denoise) finishPages(baked.pages, made_.atlas, texels_, {.denoise = true, .rings = 0});
     Indirect found;
-    for (const TexelCoord at : texels_[0].coords)
-      if (counts(at))
-        found.light.push_back(static_cast<double>(luminance(all.pages[0].flat.rgb(at.x, at.y))) -
-                              static_cast<double>(luminance(direct.pages[0].flat.rgb(at.x, at.y))));
+    for (const TexelCoord at : counting_)
+      found.light.push_back(static_cast<double>(luminance(baked.pages[0].flat.rgb(at.x, at.y))));
     found.raysPerTexel =
-        static_cast<double>(all.stats.rays + all.stats.shadowRays) / static_cast<double>(texels_[0].size());
+        static_cast<double>(baked.stats.rays + baked.stats.shadowRays) / static_cast<double>(texels_[0].size());
     return found;
   }
 
@@ -54,25 +65,16 @@ class Study {
     LUMEL_CHECK(bool(result));
     return *std::move(result);
   }
-  /// Texels inside of things hold nothing of use, and at their edge path tracing counts what lies inside; with a door,
-  /// texels of the room without lamp count.
-  bool counts(TexelCoord at) const {
-    if (validity_.at(at.x, at.y)[1] < 0.99f) return false;
-    if (!door_) return true;
-    for (std::size_t i = 0; i < texels_[0].size(); ++i)
-      if (texels_[0].coords[i].x == at.x && texels_[0].coords[i].y == at.y) {
-        const TriangleRef ref = texels_[0].trianglesOf(i)[0];
-        const Surface& surface = made_.atlas.surfaces[ref.surface];
-        return surface.positions[surface.indices[std::size_t{3} * ref.triangle]].x >= 4.2f &&
-               surface.positions[surface.indices[std::size_t{3} * ref.triangle + 1]].x >= 4.2f;
-      }
-    return false;
+  bool isDark(std::size_t texel) const {
+    const TriangleRef ref = texels_[0].trianglesOf(texel)[0];
+    const Surface& surface = made_.atlas.surfaces[ref.surface];
+    const std::uint32_t* corner = surface.indices.data() + std::size_t{3} * ref.triangle;
+    return surface.positions[corner[0]].x >= 4.2f && surface.positions[corner[1]].x >= 4.2f;
   }
 
   GridScene made_;
-  bool door_;
   std::vector<PageTexels> texels_;
-  Image validity_;
+  std::vector<TexelCoord> counting_;
 };
 
 double mean(const std::vector<double>& values) {
@@ -97,45 +99,47 @@ double raysFor(double error, const std::vector<Point>& curve) {
   return last.rays * std::pow(last.error / error, 2);
 }
 
-void indirect(benchmark::State& state) {
-  const bool door = state.range(0) != 0;
+void indirect(benchmark::State& state, Where where, int referenceSamples) {
   for (auto _ : state) {
-    const Study study(door);
-    const int referenceSamples = static_cast<int>(state.range(1));
+    const Study study(where);
     const Indirect a = study.measure(Integrator::Path, referenceSamples, 101);
     const Indirect b = study.measure(Integrator::Path, referenceSamples, 202);
     const double truth = 0.5 * (mean(a.light) + mean(b.light));
     double noise = 0;
     for (std::size_t i = 0; i < a.light.size(); ++i) noise += std::pow(a.light[i] - b.light[i], 2) / 4;
     state.counters["reference_error"] = std::sqrt(noise / static_cast<double>(a.light.size())) / truth;
-    const auto errorOf = [&](const Indirect& x) {
-      double sum = 0;
-      for (std::size_t i = 0; i < x.light.size(); ++i) sum += (x.light[i] - a.light[i]) * (x.light[i] - b.light[i]);
-      return std::sqrt(std::max(0.0, sum / static_cast<double>(x.light.size()))) / truth;
+    const auto curveOf = [&](Integrator integrator, const char* name, std::initializer_list<int> counts,
+                             bool denoise = false) {
+      std::vector<Point> curve;
+      for (const int samples : counts) {
+        const Indirect x = study.measure(integrator, samples, 7, denoise);
+        double sum = 0;
+        for (std::size_t i = 0; i < x.light.size(); ++i) sum += (x.light[i] - a.light[i]) * (x.light[i] - b.light[i]);
+        const double error = std::sqrt(std::max(0.0, sum / static_cast<double>(x.light.size()))) / truth;
+        curve.push_back({x.raysPerTexel, error});
+        const std::string label = name + std::to_string(samples);
+        state.counters[label + "_error"] = error;
+        state.counters[label + "_rays"] = x.raysPerTexel;
+        state.counters[label + "_bias"] = mean(x.light) / truth - 1;
+      }
+      return curve;
     };
-    std::vector<Point> path, gather;
-    for (const int samples : {64, 256}) {
-      const Indirect found = study.measure(Integrator::Path, samples, 7);
-      path.push_back({found.raysPerTexel, errorOf(found)});
+    const std::vector<Point> path = curveOf(Integrator::Path, "path", {64, 256, 1024, 2048});
+    const std::vector<Point> gather = curveOf(Integrator::Gather, "gather", {16, 32, 64, 128, 256, 512, 1024});
+    // What a bake hands out. Not a comparison of methods: paths could be denoised too.
+    curveOf(Integrator::Gather, "denoised", {16, 32, 64, 128, 256}, true);
+    for (const int percent : {5, 2}) {
+      const std::string label = std::to_string(percent) + "pct";
+      state.counters["path_rays_" + label] = raysFor(0.01 * percent, path);
+      state.counters["gather_rays_" + label] = raysFor(0.01 * percent, gather);
+      state.counters["fewer_" + label] = raysFor(0.01 * percent, path) / raysFor(0.01 * percent, gather);
     }
-    for (const int samples : {16, 32, 64, 128, 256, 512}) {
-      const Indirect found = study.measure(Integrator::Gather, samples, 7);
-      gather.push_back({found.raysPerTexel, errorOf(found)});
-      state.counters["gather" + std::to_string(samples) + "_error"] = gather.back().error;
-      state.counters["bias" + std::to_string(samples)] = mean(found.light) / truth - 1;
-    }
-    state.counters["path256_error"] = path.back().error;
-    state.counters["path_rays_2pct"] = raysFor(0.02, path);
-    state.counters["gather_rays_2pct"] = raysFor(0.02, gather);
-    state.counters["fewer"] = raysFor(0.02, path) / raysFor(0.02, gather);
   }
 }
-BENCHMARK(indirect)
-    ->ArgNames({"door", "reference"})
-    ->Args({0, 2048})
-    ->Args({1, 4096})
-    ->Iterations(1)
-    ->Unit(benchmark::kSecond);
+BENCHMARK_CAPTURE(indirect, cornell, Where::Cornell, 4096)->Iterations(1)->Unit(benchmark::kSecond);
+BENCHMARK_CAPTURE(indirect, empty_box, Where::EmptyBox, 4096)->Iterations(1)->Unit(benchmark::kSecond);
+BENCHMARK_CAPTURE(indirect, rooms, Where::Rooms, 4096)->Iterations(1)->Unit(benchmark::kSecond);
+BENCHMARK_CAPTURE(indirect, dark_room, Where::DarkRoom, 8192)->Iterations(1)->Unit(benchmark::kSecond);
 
 }  // namespace
 }  // namespace lumel
