@@ -21,7 +21,7 @@ struct Bake {
 Bake bakeOf(const std::filesystem::path& scene, const std::string& pageSize) {
   const auto out = scene.parent_path() / ("out-" + pageSize);
   const Outcome baked =
-      run({"bake", scene, "-o", out, "--samples", "1", "--uv", "generate", "--page-size", pageSize});
+      run({"bake", scene, "-o", out, "--samples", "1", "--uv", "generate", "--page-size", pageSize, "--threads", "4"});
   const Outcome told = run({"info", scene, "--json", "--page-size", pageSize});
   EXPECT_EQ(baked.exitCode, 0) << baked.err;
   EXPECT_EQ(told.exitCode, 0) << told.err;
@@ -32,8 +32,8 @@ Bake bakeOf(const std::filesystem::path& scene, const std::string& pageSize) {
           record.at("cost").at("texels").get<double>()};
 }
 
-// The libraries' share, 145 MB where it was measured, is half of the peaks here and differs between systems; real scenes
-// were told within -1.5 and +19% (baker/README.md).
+// The libraries' share, 145 MB where it was measured, is half of the peaks here and differs between systems; real
+// scenes were told within -1.5 and +19% (baker/README.md).
 constexpr double kLeast = 0.75;
 constexpr double kMost = 1.1;
 
@@ -56,7 +56,8 @@ TEST(Memory, OfTrianglesIsTold) {
   std::string obj;
   for (int y = 0; y <= kSide; ++y)
     for (int x = 0; x <= kSide; ++x)
-      obj += "v " + std::to_string(x) + " " + std::to_string((x * 7 + y * 3) % 5 * 0.05) + " " + std::to_string(y) + "\n";
+      obj +=
+          "v " + std::to_string(x) + " " + std::to_string((x * 7 + y * 3) % 5 * 0.05) + " " + std::to_string(y) + "\n";
   for (int y = 0; y < kSide; ++y)
     for (int x = 0; x < kSide; ++x) {
       const int a = y * (kSide + 1) + x + 1;
