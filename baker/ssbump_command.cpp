@@ -298,7 +298,7 @@ void declareOcclusion(OptionTable& o, SsbumpArguments& a) {
   o.group("Occlusion");
   o.choice("method", a.method, {"horizon", "rays"},
            "horizon: exact horizons, noise-free; rays: Embree, for checks (meshes always use rays)");
-  o.integer("azimuths", a.azimuths, {0, 1024}, "Slices of the horizon method; 0: 52 for heights that span up to 32 texels, else 64");
+  o.integer("azimuths", a.azimuths, {0, 1024}, "Slices of the horizon method; 0: 48 for heights that span up to 32 texels, else 64");
   o.integer("rays", a.rays, {1, 1 << 20}, "Rays per texel");
   o.choice("sampling", a.sampling, {"random", "stratified", "sobol"}, "How rays are spread");
   o.integer("seed", a.seed, "Seed of the rays");

@@ -155,7 +155,7 @@ int automaticReach(const HeightField& field) {
 
 int automaticAzimuths(const HeightField& field) {
   constexpr float kLowRelief = 32.0f;
-  return field.highest - field.lowest <= kLowRelief ? 52 : 64;
+  return field.highest - field.lowest <= kLowRelief ? 48 : 64;
 }
 
 Horizon::Horizon(const HeightField& field, const HorizonSettings& settings) : settings_(settings), rows_(field) {

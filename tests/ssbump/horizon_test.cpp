@@ -247,7 +247,7 @@ TEST(Horizon, ReachLimitsWhatOccludes) {
 TEST(Horizon, HigherReliefTakesMoreAzimuths) {
   HeightField field;
   field.highest = 32;
-  EXPECT_EQ(automaticAzimuths(field), 52);
+  EXPECT_EQ(automaticAzimuths(field), 48);
   field.lowest = -1;
   EXPECT_EQ(automaticAzimuths(field), 64);
 }
