@@ -93,6 +93,7 @@ TEST(LitSides, WhatIsLitStaysAsItIsWound) {
   Light lamp;
   lamp.intensity = 1e-4f;
   room.scene.lights.push_back(lamp);
+  room.addRectangle({-20, -2, 20}, {40, 0, 0}, {0, 0, -40});  // the meadow
   EXPECT_EQ(turned(room.scene), 0u);
 }
 
