@@ -12,6 +12,7 @@
 #include "lightmap/surface.h"
 #include "lightmap/texels.h"
 #include "scene/triangles.h"
+#include "scene/union_find.h"
 
 namespace lumel {
 namespace {
@@ -21,8 +22,8 @@ namespace {
 /// around them.
 constexpr double kDark = 1e-6;
 constexpr double kDarkAgainstOthers = 0.5;
-/// First for all fronts; then, where they got less than that share of the mean, for both sides. Light has to find its way
-/// through doors, not to be converged.
+/// First for all fronts; then, where they got less than that share of the mean, for both sides. Light has to find its
+/// way through doors, not to be converged.
 constexpr int kFirstSamples = 16;
 constexpr int kSureSamples = 512;
 constexpr int kBounces = 8;
@@ -39,37 +40,6 @@ struct TwoSided {
   std::vector<std::array<std::uint32_t, 2>> opposed;  // patches that share an edge and are wound unlike
 };
 
-/// Sets of triangles that grow together (union by the lower index, with path halving).
-class Groups {
- public:
-  explicit Groups(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = find(a);
-    b = find(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
-
-/// Per vertex: the first in order of place that lies where it lies.
-std::vector<std::uint32_t> weld(const std::vector<Vec3>& positions) {
-  std::vector<std::uint32_t> order(positions.size());
-  std::iota(order.begin(), order.end(), 0u);
-  const auto key = [&](std::uint32_t v) { return std::tie(positions[v].x, positions[v].y, positions[v].z); };
-  std::sort(order.begin(), order.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return std::tuple(key(a), a) < std::tuple(key(b), b); });
-  std::vector<std::uint32_t> welded(positions.size());
-  for (std::size_t i = 0; i < order.size(); ++i)
-    welded[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? welded[order[i - 1]] : order[i];
-  return welded;
-}
-
 /// Fills in all that counts patches, from found.firstPatch on.
 void findPatches(const Primitive& primitive, TwoSided& found) {
   struct Edge {
@@ -77,7 +47,7 @@ void findPatches(const Primitive& primitive, TwoSided& found) {
     std::uint32_t triangle;
     bool rising;
   };
-  const std::vector<std::uint32_t> welded = weld(primitive.positions);
+  const std::vector<std::uint32_t> welded = weldPositions(primitive.positions);
   std::vector<Edge> edges;
   edges.reserve(primitive.indices.size());
   for (std::uint32_t t = 0; t < primitive.triangleCount(); ++t)
@@ -96,13 +66,14 @@ void findPatches(const Primitive& primitive, TwoSided& found) {
       if (end - i == 2) visit(edges[i].triangle, edges[i + 1].triangle, edges[i].rising != edges[i + 1].rising);
     }
   };
-  Groups groups(primitive.triangleCount());
+  std::vector<std::uint32_t> groups(primitive.triangleCount());
+  std::iota(groups.begin(), groups.end(), 0u);
   forEachBorder([&](std::uint32_t a, std::uint32_t b, bool alike) {
-    if (alike) groups.join(a, b);
+    if (alike) unite(groups, a, b);
   });
   found.patchOf.resize(primitive.triangleCount());
   for (std::uint32_t t = 0; t < found.patchOf.size(); ++t) {
-    const std::uint32_t group = groups.find(t);  // named after its first triangle
+    const std::uint32_t group = findRoot(groups, t);  // named after its first triangle
     found.patchOf[t] = group == t ? found.firstPatch + found.patchCount++ : found.patchOf[group];
   }
   forEachBorder([&](std::uint32_t a, std::uint32_t b, bool alike) {

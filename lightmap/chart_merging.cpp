@@ -11,6 +11,7 @@
 #include "lightmap/flatten.h"
 #include "lightmap/frame_slits.h"
 #include "scene/parallel.h"
+#include "scene/union_find.h"
 
 namespace lumel {
 namespace {
@@ -220,11 +221,6 @@ class PartMerger {
   BorderQueue queue_;
 };
 
-std::uint32_t findRoot(std::vector<std::uint32_t>& parent, std::uint32_t x) {
-  while (parent[x] != x) x = parent[x] = parent[parent[x]];
-  return x;
-}
-
 }  // namespace
 
 std::vector<FlatChart> mergeCharts(const HalfEdgeMesh& mesh, std::vector<FlatChart> charts, const MergeOptions& options) {
@@ -235,10 +231,7 @@ std::vector<FlatChart> mergeCharts(const HalfEdgeMesh& mesh, std::vector<FlatCha
   std::iota(parent.begin(), parent.end(), 0u);
   for (std::uint32_t t = 0; t < mesh.size(); ++t)
     for (const std::int32_t n : mesh.neighbours[t]) {
-      if (n < 0) continue;
-      const std::uint32_t a = findRoot(parent, chartOf[t]);
-      const std::uint32_t b = findRoot(parent, chartOf[static_cast<std::size_t>(n)]);
-      parent[std::max(a, b)] = std::min(a, b);
+      if (n >= 0) unite(parent, chartOf[t], chartOf[static_cast<std::size_t>(n)]);
     }
   std::vector<std::vector<FlatChart*>> parts;
   std::vector<std::uint32_t> partOf(charts.size(), 0);

@@ -5,17 +5,13 @@
 #include <numeric>
 
 #include "lightmap/triangle_overlap.h"
+#include "scene/union_find.h"
 
 namespace lumel {
 namespace {
 
 // A float UV on a page of some thousand texels is known to about 5e-5 texels: flips a good deal thinner are lost there.
 constexpr double kFlipTexels = 1e-5;
-
-std::uint32_t findRoot(std::vector<std::uint32_t>& parent, std::uint32_t x) {
-  while (parent[x] != x) x = parent[x] = parent[parent[x]];
-  return x;
-}
 
 double cornerArea(const std::array<Vec2d, 3>& t) { return cross2(t[1] - t[0], t[2] - t[0]); }
 
@@ -50,11 +46,7 @@ void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart) {
       const auto& theirs = mesh.triangles[chart.meshTriangles[u]];
       for (const std::uint32_t i : {k, (k + 1) % 3})
         for (std::uint32_t j = 0; j < 3; ++j)
-          if (mine[i] == theirs[j]) {
-            const std::uint32_t a = findRoot(corner, 3 * t + i);
-            const std::uint32_t b = findRoot(corner, 3 * u + j);
-            corner[std::max(a, b)] = std::min(a, b);
-          }
+          if (mine[i] == theirs[j]) unite(corner, 3 * t + i, 3 * u + j);
     }
   }
   std::vector<std::uint32_t> vertexOf(3 * count, 0);

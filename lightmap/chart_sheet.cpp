@@ -5,6 +5,7 @@
 
 #include "lightmap/frame_slits.h"
 #include "lightmap/triangle_overlap.h"
+#include "scene/union_find.h"
 
 namespace lumel {
 namespace {
@@ -119,9 +120,7 @@ void ChartSheet::addTriangles(std::uint32_t index, const FlatChart& flat) {
 }
 
 std::uint32_t ChartSheet::vertexAt(std::uint32_t triangle, std::uint32_t k) const {
-  std::uint32_t x = cornerVertex_[localTriangle_[triangle]][k];
-  while (parent_[x] != x) x = parent_[x] = parent_[parent_[x]];
-  return x;
+  return findRoot(parent_, cornerVertex_[localTriangle_[triangle]][k]);
 }
 
 std::array<Vec2d, 3> ChartSheet::corners(std::uint32_t triangle) const {

@@ -2,8 +2,10 @@
 
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <algorithm>
-#include <bit>
 #include <numeric>
+
+#include "scene/triangles.h"
+#include "scene/union_find.h"
 
 namespace lumel {
 namespace {
@@ -26,32 +28,11 @@ struct Side {  // of an edge: one triangle's half-edge
   std::uint32_t corner;     // 3 * triangle + k: runs from corner k to k + 1
 };
 
-/// Smallest vertex with the same position, per vertex: exact, so it is the same at any scale.
-std::vector<std::uint32_t> weld(const std::vector<Vec3>& positions) {
-  std::vector<std::array<std::uint32_t, 4>> keys(positions.size());
-  for (std::uint32_t i = 0; i < keys.size(); ++i) {
-    const Vec3 p = positions[i] + 0.0f;  // -0 becomes 0
-    keys[i] = {std::bit_cast<std::uint32_t>(p.x), std::bit_cast<std::uint32_t>(p.y), std::bit_cast<std::uint32_t>(p.z), i};
-  }
-  std::sort(keys.begin(), keys.end());
-  std::vector<std::uint32_t> first(positions.size());
-  for (std::size_t i = 0; i < keys.size(); ++i) {
-    const bool same = i > 0 && std::equal(keys[i].begin(), keys[i].begin() + 3, keys[i - 1].begin());
-    first[keys[i][3]] = same ? first[keys[i - 1][3]] : keys[i][3];
-  }
-  return first;
-}
-
-std::uint32_t findRoot(std::vector<std::uint32_t>& parent, std::uint32_t x) {
-  while (parent[x] != x) x = parent[x] = parent[parent[x]];
-  return x;
-}
-
 std::uint32_t nextCorner(std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
 
 class Builder {
  public:
-  explicit Builder(const TriangleSoup& soup) : soup_(soup), welded_(weld(soup.positions)) {}
+  explicit Builder(const TriangleSoup& soup) : soup_(soup), welded_(weldPositions(soup.positions)) {}
 
   HalfEdgeMesh build() {
     keepTriangles();
@@ -169,16 +150,11 @@ class Builder {
   void cutIntoFans() {
     fan_.resize(opposite_.size());
     std::iota(fan_.begin(), fan_.end(), 0u);
-    const auto unite = [this](std::uint32_t a, std::uint32_t b) {
-      a = findRoot(fan_, a);
-      b = findRoot(fan_, b);
-      if (a != b) fan_[std::max(a, b)] = std::min(a, b);
-    };
     for (std::uint32_t corner = 0; corner < opposite_.size(); ++corner) {
       if (opposite_[corner] < static_cast<std::int32_t>(corner)) continue;
       const auto other = static_cast<std::uint32_t>(opposite_[corner]);
-      unite(corner, nextCorner(other));
-      unite(nextCorner(corner), other);
+      unite(fan_, corner, nextCorner(other));
+      unite(fan_, nextCorner(corner), other);
     }
   }
 

@@ -6,16 +6,12 @@
 
 #include "lightmap/bake_frame.h"
 #include "lightmap/scene_uvs.h"
+#include "scene/union_find.h"
 
 namespace lumel {
 namespace {
 
 constexpr float kFrameCos = 0.9962f;  // 5 degrees: what a consumer would see
-
-std::uint32_t findRoot(std::vector<std::uint32_t>& parent, std::uint32_t x) {
-  while (parent[x] != x) x = parent[x] = parent[parent[x]];
-  return x;
-}
 
 struct UvVertex {
   std::array<std::uint32_t, 5> key;  // position, uv
@@ -65,18 +61,13 @@ std::vector<PlacedTriangle> placeSceneUvs(const Scene& scene, int instanceIndex,
   Vertices all = gather(mesh);
   std::vector<std::uint32_t> parent(all.vertices.size());
   std::iota(parent.begin(), parent.end(), 0u);
-  const auto unite = [&parent](std::uint32_t a, std::uint32_t b) {
-    a = findRoot(parent, a);
-    b = findRoot(parent, b);
-    parent[std::max(a, b)] = std::min(a, b);
-  };
   std::vector<bool> breaks(all.vertices.size(), false);
   std::sort(all.vertices.begin(), all.vertices.end());
   for (std::size_t i = 1; i < all.vertices.size(); ++i) {
     const std::uint32_t a = all.vertices[i - 1].index;
     const std::uint32_t b = all.vertices[i].index;
     if (all.vertices[i - 1].key != all.vertices[i].key) continue;
-    unite(a, b);
+    unite(parent, a, b);
     if (!sameFrame(all.frames[a], all.frames[b])) breaks[a] = breaks[b] = true;
   }
 
@@ -88,7 +79,7 @@ std::vector<PlacedTriangle> placeSceneUvs(const Scene& scene, int instanceIndex,
     for (std::uint32_t t = 0; t < primitive.triangleCount(); ++t) {
       const std::uint32_t* v = &primitive.indices[3 * t];
       const std::vector<Vec2>& uvs = primitive.uvSets[1];
-      for (std::size_t k = 1; k < 3; ++k) unite(all.base[p] + v[0], all.base[p] + v[k]);
+      for (std::size_t k = 1; k < 3; ++k) unite(parent, all.base[p] + v[0], all.base[p] + v[k]);
       placed.push_back({static_cast<int>(p), t, page, 0, {uvs[v[0]], uvs[v[1]], uvs[v[2]]}});
       roots.push_back(all.base[p] + v[0]);
     }

@@ -1,6 +1,8 @@
 #include "scene/triangles.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 
 #include "scene/tangents.h"
 #include "scene/vertex_splitter.h"
@@ -149,6 +151,22 @@ void finishPrimitive(Primitive& primitive, const Material& material, LoadReport&
     return;
   }
   makeTangents(primitive, set, material.normalMap.uvMatrix);
+}
+
+std::vector<std::uint32_t> weldPositions(const std::vector<Vec3>& positions) {
+  std::vector<std::array<std::uint32_t, 4>> keys(positions.size());
+  for (std::uint32_t i = 0; i < keys.size(); ++i) {
+    const Vec3 p = positions[i] + 0.0f;  // -0 becomes 0
+    keys[i] = {std::bit_cast<std::uint32_t>(p.x), std::bit_cast<std::uint32_t>(p.y), std::bit_cast<std::uint32_t>(p.z),
+               i};
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::uint32_t> first(positions.size());
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    const bool same = i > 0 && std::equal(keys[i].begin(), keys[i].begin() + 3, keys[i - 1].begin());
+    first[keys[i][3]] = same ? first[keys[i - 1][3]] : keys[i][3];
+  }
+  return first;
 }
 
 }  // namespace lumel

@@ -1,4 +1,4 @@
-// What every loader does to a primitive before it is handed on: degenerate triangles go, normals are made or
+// Work on primitives. What every loader does before one is handed on: degenerate triangles go, normals are made or
 // repaired, vertices that nothing uses go.
 #pragma once
 
@@ -35,5 +35,8 @@ void gatherVertices(Primitive& primitive, std::span<const std::uint32_t> source)
 /// All of the above in order, then MikkTSpace tangents if the material has a normal map and the file gave none.
 /// Counts and warnings go to `report`.
 void finishPrimitive(Primitive& primitive, const Material& material, LoadReport& report);
+
+/// Per vertex: the first with the same position. Exact, so it is the same at any scale; -0 is 0.
+std::vector<std::uint32_t> weldPositions(const std::vector<Vec3>& positions);
 
 }  // namespace lumel
