@@ -1,5 +1,6 @@
 // lumel bake: from a scene file to the files of a bake.
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <memory>
 
@@ -182,6 +183,9 @@ Expected<AtlasResult> makeAtlas(const Scene& scene, const BakeArguments& a, Comm
 
 Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   if (auto checked = check(a); !checked) return checked;
+  for (const fs::path& input : {a.scene, a.sky})
+    if (isBakeFile(input.filename().string()))
+      if (auto apart = checkNoInput(a.output / input.filename(), std::array{input}); !apart) return apart;
   FileSet::recover(a.output);
   if (auto writable = checkWritable(a.output); !writable) return writable;
   keepLargeArraysApart();

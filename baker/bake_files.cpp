@@ -86,6 +86,10 @@ std::string pageFileName(std::size_t page, const std::string& kind) {
   return "lightmap-" + std::to_string(page) + "-" + kind + ".exr";
 }
 
+bool isBakeFile(const std::string& name) {
+  return isPageImage(name) || name == "sky.exr" || name == "scene.glb" || name == "bake.json";
+}
+
 Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasResult& atlas, const BakeResult& result,
                          const BakeRecord& record) {
   auto set = FileSet::forFolder(dir);
@@ -108,7 +112,7 @@ Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasRes
   if (!glb) return glb.error();
   if (auto done = writeFile("scene.glb", std::span<const std::vector<std::uint8_t>>(*glb)); !done) return done;
   if (auto done = writeFile("bake.json", describeBake(scene, atlas, result, record)); !done) return done;
-  return set->commitFolder([](const std::string& name) { return isPageImage(name) || name == "sky.exr"; });
+  return set->commitFolder(isBakeFile);
 }
 
 }  // namespace lumel

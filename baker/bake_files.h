@@ -45,6 +45,9 @@ inline constexpr int kBakeFormat = 1;
 Expected<void> writeBake(const std::filesystem::path& dir, const Scene& scene, const AtlasResult& atlas,
                          const BakeResult& result, const BakeRecord& record);
 
+/// Whether a bake writes a file of that name.
+bool isBakeFile(const std::string& name);
+
 /// File name of a page's image: kind is "rnm0", "rnm1", "rnm2", "flat" or "aux".
 std::string pageFileName(std::size_t page, const std::string& kind);
 

@@ -1,5 +1,6 @@
 // lumel diff: how far two images or two bakes are apart.
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <memory>
 #include <ostream>
@@ -8,6 +9,7 @@
 #include "baker/baked_scene.h"
 #include "baker/command.h"
 #include "baker/image_figures.h"
+#include "scene/file_set.h"
 #include "scene/image_io.h"
 
 namespace lumel {
@@ -116,6 +118,7 @@ Expected<void> report(const DiffArguments& a, CommandContext& context, const std
 }
 
 Expected<void> diffImages(const DiffArguments& a, CommandContext& context) {
+  if (auto apart = checkNoInput(a.heat, std::array{a.a, a.b, a.mask}); !apart) return apart;
   PixelMask mask = [](int, int) { return true; };
   if (!a.mask.empty()) {
     auto read = readMask(a.mask);

@@ -1,5 +1,6 @@
 // lumel render: a still of a bake.
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cstdio>
 #include <memory>
@@ -148,6 +149,8 @@ Expected<void> writeStill(const RenderArguments& a, const Still& still, const st
 
 Expected<void> runRender(const RenderArguments& a, CommandContext& context) {
   if (auto checked = check(a); !checked) return checked;
+  if (isBakeFile(a.output.filename().string()))
+    if (auto apart = checkNoInput(a.output, std::array{a.bake / a.output.filename()}); !apart) return apart;
   const fs::path folder = a.output.has_parent_path() ? a.output.parent_path() : fs::path(".");
   std::error_code ec;
   fs::create_directories(folder, ec);

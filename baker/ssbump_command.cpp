@@ -1,5 +1,6 @@
 // lumel ssbump: self-shadowed bump maps from height maps and meshes, and the ways from one map to another.
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <memory>
 
@@ -237,6 +238,11 @@ Expected<void> checkUse(const SsbumpArguments& a, const OptionTable& options) {
 Expected<void> checkPlaces(const SsbumpArguments& a) {
   if (a.output.empty() && a.study.empty() && a.contactSheet.empty())
     return usageError("-o FILE is missing: where the ssbump map goes (or --study DIR, --contact-sheet FILE)");
+  const std::array inputs{a.input, a.normalMap, a.low, fs::path(a.basis), a.albedo, a.mask, a.detail, a.crossFade};
+  const MapFiles& save = a.save;
+  for (const fs::path& place : {a.output, save.weights, save.occlusion, save.ambient, save.normal, save.recovered,
+                                a.contactSheet})
+    if (auto apart = checkNoInput(place, inputs); !apart) return apart;
   if (!a.study.empty())
     if (auto writable = checkWritable(a.study); !writable) return writable;
   if (!a.contactSheet.empty())

@@ -177,6 +177,14 @@ Expected<void> writeBytes(const PendingFile& file, std::span<const std::vector<s
   return {};
 }
 
+Expected<void> checkNoInput(const fs::path& place, std::span<const fs::path> inputs) {
+  std::error_code ec;
+  for (const fs::path& input : inputs)
+    if (!place.empty() && !input.empty() && fs::equivalent(place, input, ec))
+      return usageError(place.string() + ": is read as an input and would be lost; choose another output");
+  return {};
+}
+
 Expected<void> checkWritable(const fs::path& dir) {
   fs::path made;  // the first folder on the way that is not there yet
   std::error_code ec;

@@ -76,6 +76,10 @@ Expected<void> writeBytes(const PendingFile& file, std::string_view bytes);
 /// The pieces one after the other.
 Expected<void> writeBytes(const PendingFile& file, std::span<const std::vector<std::uint8_t>> pieces);
 
+/// Refuses a result that would take the place of a file that it is made from. Empty paths are passed over.
+/// Errors: Usage, naming the file.
+Expected<void> checkNoInput(const std::filesystem::path& place, std::span<const std::filesystem::path> inputs);
+
 /// Finds out before the long work whether `dir` can be written: makes it and a file in it, and removes what it made.
 /// Errors: Failed, naming the folder.
 Expected<void> checkWritable(const std::filesystem::path& dir);

@@ -77,6 +77,30 @@ TEST(ExitCodes, WrongCommandLineIs2) {
   EXPECT_FALSE(std::filesystem::exists(out));
 }
 
+TEST(ExitCodes, OutputOverItsOwnInputIs2AndLosesNothing) {
+  const std::filesystem::path folder = scratch();
+  const std::string scene = floorScene(folder);
+  const std::filesystem::path level = folder / "level";
+  ASSERT_EQ(run({"bake", scene, "-o", level, "--samples", "1", "--page-size", "16"}).exitCode, 0);
+  std::filesystem::copy_file(level / "lightmap-0-flat.exr", folder / "flat.exr");
+  std::filesystem::copy_file(level / "lightmap-0-flat.exr", folder / "sky.exr");
+  const auto before = readFolder(level);
+  EXPECT_TRUE(fails(run({"bake", level / "scene.glb", "-o", level}), 2, {"scene.glb", "input"}));
+  EXPECT_TRUE(fails(run({"bake", level / "../level/scene.glb", "-o", level}), 2, {"scene.glb", "input"}));
+  EXPECT_TRUE(fails(run({"bake", scene, "--sky", folder / "sky.exr", "-o", folder}), 2, {"sky.exr", "input"}));
+  EXPECT_TRUE(fails(run({"render", level, "-o", level / "lightmap-0-flat.exr"}), 2, {"lightmap-0-flat.exr", "input"}));
+  EXPECT_EQ(readFolder(level), before);
+  const std::string flat = folder / "flat.exr";
+  const std::string content = readFile(flat);
+  EXPECT_TRUE(fails(run({"diff", level / "lightmap-0-flat.exr", flat, "-o", flat}), 2, {"flat.exr", "input"}));
+  EXPECT_TRUE(fails(run({"ssbump", flat, "-o", flat}), 2, {"flat.exr", "input"}));
+  EXPECT_TRUE(fails(run({"ssbump", scene, "-o", folder / "s.exr", "--mask", flat, "--save-ao", flat}), 2,
+                    {"flat.exr", "input"}));
+  EXPECT_EQ(readFile(flat), content);
+  // Files of a bake that are no input here are replaced as ever.
+  EXPECT_EQ(run({"bake", scene, "-o", level, "--samples", "1", "--page-size", "16"}).exitCode, 0);
+}
+
 TEST(ExitCodes, WrongInputIs3) {
   const auto dir = scratch();
   const std::string out = dir / "out";
