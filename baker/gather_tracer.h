@@ -1,6 +1,7 @@
 // Rays that end on the texel cache: a ray stops at the first surface whose texel knows what it reflects. Where a hit
 // has no texel (a surface without lightmap, the back of a single-sided one) it is shaded on the spot: its direct light
-// is sampled and one ray goes on, until it meets a texel.
+// is sampled and one ray goes on, until it meets a texel. So is the first hit of a ray that is no longer than its texels
+// are wide: in corners and at the feet of things one value for a whole texel would tell its neighbours the wrong light.
 #pragma once
 
 #include <algorithm>
@@ -87,6 +88,12 @@ class GatherTracer {
       sink_.texel(flight, texel);
     else if (flight.depth < lastDepth_)
       leaveToShade(flight, hit, albedoAt(part, packet, lane, hit));
+  }
+
+  /// Shades the hit on the spot, although it has a texel.
+  void arriveNear(const RayPacket& packet, int lane, const Flight& flight) {
+    const HitSurface hit = transport_.rays.surfaceAt(packet, lane);
+    leaveToShade(flight, hit, albedoAt(hit.part, packet, lane, hit));
   }
 
   /// The sky's radiance for a ray that was gathered with density `pdf`. Precondition: environment.shines().

@@ -401,7 +401,10 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
     ++sink.result.rays;
     const float beta = kInvPi / rays.pdf[lane];
     const std::uint32_t texel = packet.lookup.texels[lane];
-    if (texel != kNoTexel) {
+    if (texel != kNoTexel && level >= 0 && packet.lookup.near[lane]) {
+      tracer.arriveNear(rays.packet, static_cast<int>(lane),
+                        flightOf(lane, net_.sample(packet.cell, lane), points_[packet.cell], rays));
+    } else if (texel != kNoTexel) {
       if (level >= 0) light.set(lane, beta * sink.reflectedBy(texel)[level]);
       sink.passOnLevels(lane, rays.dirTangent[lane], Vec3(beta), texel, 0);
     } else if (rays.packet.hit(static_cast<int>(lane))) {

@@ -11,6 +11,15 @@
 
 namespace lumel {
 
+/// Of a surface's triangle whose corners lie at `pixels` of its page: metres, 0 where it has no area there.
+static float texelWidth(const Surface& surface, std::size_t triangle, const std::array<Vec2, 3>& pixels) {
+  const auto corner = [&](std::size_t i) { return surface.positions[surface.indices[3 * triangle + i]]; };
+  const float meters2 = glm::length(glm::cross(corner(1) - corner(0), corner(2) - corner(0)));
+  const Vec2 u = pixels[1] - pixels[0], v = pixels[2] - pixels[0];
+  const float texels = std::abs(u.x * v.y - u.y * v.x);
+  return texels > 0.0f ? std::sqrt(meters2 / texels) : 0.0f;
+}
+
 TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<PageTexels>& texels)
     : rays_(rays), atlas_(atlas), texels_(texels) {
   firstOfPage_.push_back(0);
@@ -61,7 +70,8 @@ void TexelMap::addSurface(std::uint32_t part, const Surface& surface) {
           pixels[i] = surface.lightmapUvs[vertex] * Vec2(page.width, page.height);
       }
     triangles_[static_cast<std::size_t>(first) + sourceTriangle] = {
-        pixels[0], pixels[1] - pixels[0], pixels[2] - pixels[0], static_cast<std::uint32_t>(surface.page)};
+        pixels[0], pixels[1] - pixels[0], pixels[2] - pixels[0], static_cast<std::uint32_t>(surface.page),
+        texelWidth(surface, t, pixels)};
   }
 }
 
@@ -130,8 +140,10 @@ void TexelMap::findPixels(const RayPacket& packet, Lookup& lookup) const {
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const Triangle* triangle = lookup.triangles[lane];
     lookup.pixels[lane] = nullptr;
+    lookup.near[lane] = false;
     if (!triangle || triangle->page == kNoTexel) continue;
     const PageMap& page = pages_[triangle->page];
+    lookup.near[lane] = packet.rayhit.ray.tfar[lane] < Lookup::kNearTexels * triangle->texelMeters;
     lookup.places[lane] = triangle->at(packet.rayhit.hit.u[lane], packet.rayhit.hit.v[lane]);
     // Rounding may lead over the page's border.
     const int x = std::clamp(static_cast<int>(lookup.places[lane].x), 0, page.width - 1);

@@ -68,6 +68,7 @@ class TexelMap {
   struct alignas(32) Triangle {
     Vec2 pixel{0}, perU{0}, perV{0};  // on the page: of the first corner, and how it moves with the barycentrics
     std::uint32_t page = kNoTexel;    // kNoTexel: no lightmap
+    float texelMeters = 0.0f;         // width of a texel on the surface
 
     Vec2 at(float u, float v) const { return pixel + u * perU + v * perV; }
   };
@@ -99,6 +100,9 @@ class TexelMap {
 
 struct TexelMap::Lookup {
   std::array<std::uint32_t, kLanes> texels;
+  /// Whether the ray is shorter than kNearTexels texels of what it hit: one value for a whole texel is then too coarse.
+  std::array<bool, kLanes> near;
+  static constexpr float kNearTexels = 1.5f;
 
  private:
   friend TexelMap;
