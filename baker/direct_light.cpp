@@ -80,18 +80,12 @@ std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& st
       transport.emissive.sample(receivers.p, receivers.active, samples.draw1D(patternBase + kEmitter),
                                 samples.draw2D(patternBase + kEmitterPoint), taken);
       break;
-    case LightStrategy::Sun: {
-      const UnitSquareLanes point = samples.draw2D(patternBase + kSun);
-      sampleEach(receivers, taken,
-                 [&](const Vec3&, const Vec3&, int lane) { return transport.environment.sampleSun(point[lane]); });
+    case LightStrategy::Sun:
+      transport.environment.sampleSun(samples.draw2D(patternBase + kSun), taken);
       break;
-    }
-    case LightStrategy::Sky: {
-      const UnitSquareLanes point = samples.draw2D(patternBase + kSky);
-      sampleEach(receivers, taken,
-                 [&](const Vec3&, const Vec3&, int lane) { return transport.environment.sampleSky(point[lane]); });
+    case LightStrategy::Sky:
+      transport.environment.sampleSky(samples.draw2D(patternBase + kSky), taken);
       break;
-    }
   }
   const int count = aimShadows(receivers, taken, density, sampled);
   sampled.shadows.any = count > 0;

@@ -65,7 +65,7 @@ class GatherTracer {
   void arrive(const RayPacket& packet, int lane, const Flight& flight) {
     if (!packet.hit(lane)) {
       if (transport_.environment.shines())
-        sink_.light(flight, skyTowards(packet.direction(lane), flight.pdf), flight.depth);
+        sink_.light(flight, transport_.environment.arriving(packet.direction(lane), flight.pdf), flight.depth);
       return;
     }
     const std::uint32_t part = transport_.rays.partOf(packet, lane);
@@ -94,12 +94,6 @@ class GatherTracer {
   void arriveNear(const RayPacket& packet, int lane, const Flight& flight) {
     const HitSurface hit = transport_.rays.surfaceAt(packet, lane);
     leaveToShade(flight, hit, albedoAt(hit.part, packet, lane, hit));
-  }
-
-  /// The sky's radiance for a ray that was gathered with density `pdf`. Precondition: environment.shines().
-  Vec3 skyTowards(const Vec3& dirWorld, float pdf) const {
-    const Vec3 radiance = transport_.environment.radiance(dirWorld);
-    return transport_.environment.sampled() ? radiance * misWeight(pdf, transport_.environment.pdf(dirWorld)) : radiance;
   }
 
   /// Follows what was left to be shaded on the spot, in full packets.

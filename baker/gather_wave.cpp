@@ -395,7 +395,9 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
   const AimedRays& rays = packet.rays;
   const int level = scene_.levels.read(scene_.bounces, 0);
   const bool shines = scene_.transport.environment.shines();
-  Vec3Lanes light;
+  Vec3Lanes light, sky;
+  if (shines && rays.packet.anyMissed())
+    scene_.transport.environment.arriving(rays.packet.directions(), rays.pdf, sky);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (!rays.packet.valid[lane]) continue;
     ++sink.result.rays;
@@ -411,7 +413,7 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
       tracer.arrive(rays.packet, static_cast<int>(lane),
                     flightOf(lane, net_.sample(packet.cell, lane), points_[packet.cell], rays));
     } else if (shines) {
-      light.set(lane, beta * tracer.skyTowards(rays.packet.direction(static_cast<int>(lane)), rays.pdf[lane]));
+      light.set(lane, beta * sky[lane]);
       if (!isFinite(light[lane])) continue;
       if (scene_.indirectOnly) {
         sink.addSeen(lane, rays.dirTangent[lane], light[lane]);

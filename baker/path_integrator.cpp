@@ -208,10 +208,7 @@ bool WaveTracer::shadeHit(int lane, int depth) {
   if (!rays_.hit(lane)) {
     if (depth == 0) result_.texels[l].sums.countGatherRay(false);
     if (!transport_.environment.shines() || leavesOut(depth)) return false;
-    const RTCRay16& ray = rays_.rayhit.ray;
-    const Vec3 dir(ray.dir_x[lane], ray.dir_y[lane], ray.dir_z[lane]);
-    path.radiance +=
-        path.beta * transport_.environment.radiance(dir) * misWeight(path.pdf, transport_.environment.pdf(dir));
+    path.radiance += path.beta * transport_.environment.arriving(rays_.direction(lane), path.pdf);
     return false;
   }
   const HitSurface& hit = hits_[l];

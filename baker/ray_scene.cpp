@@ -73,6 +73,20 @@ void RayPacket::set(int lane, const Vec3& origin, const Vec3& dir) {
   valid[lane] = -1;
 }
 
+Vec3Lanes RayPacket::directions() const {
+  Vec3Lanes lanes;
+  std::copy(std::begin(rayhit.ray.dir_x), std::end(rayhit.ray.dir_x), lanes.x);
+  std::copy(std::begin(rayhit.ray.dir_y), std::end(rayhit.ray.dir_y), lanes.y);
+  std::copy(std::begin(rayhit.ray.dir_z), std::end(rayhit.ray.dir_z), lanes.z);
+  return lanes;
+}
+
+bool RayPacket::anyMissed() const {
+  int any = 0;
+  for (int lane = 0; lane < kLanes; ++lane) any |= missed(lane) ? 1 : 0;
+  return any != 0;
+}
+
 ShadowPacket::ShadowPacket() {
   initRays(ray);
   clear();

@@ -39,7 +39,10 @@ struct alignas(64) RayPacket {
   void clear();
   void set(int lane, const Vec3& origin, const Vec3& dir);
   Vec3 direction(int lane) const { return {rayhit.ray.dir_x[lane], rayhit.ray.dir_y[lane], rayhit.ray.dir_z[lane]}; }
+  Vec3Lanes directions() const;
   bool hit(int lane) const { return valid[lane] != 0 && rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID; }
+  bool missed(int lane) const { return valid[lane] != 0 && rayhit.hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID; }
+  bool anyMissed() const;
 };
 
 /// Up to 16 rays that ask only whether anything lies between their ends.

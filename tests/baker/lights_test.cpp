@@ -158,6 +158,58 @@ TEST(EnvironmentLight, OneBrightTexelOfALargeBlackSky) {
   EXPECT_EQ(light.pdf({0, 1, 0}), 0.0f);
 }
 
+// The cells hold the light of the image's interpolant however they divide its pixels or join them: of a sky of few
+// pixels each point is met nearly as it is, of a fine one the mean.
+TEST(EnvironmentLight, CellsKeepTheLightOfAnyImage) {
+  for (const int width : {1, 3, 100, 700, 5000}) {
+    Environment sky;
+    sky.image = Image(width, std::max(1, width / 2), 3);
+    for (int y = 0; y < sky.image.height; ++y)
+      for (int x = 0; x < width; ++x)
+        sky.image.setRgb(x, y, Vec3(unitFloat(hashCombine(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)))));
+    sky.strength = 3.0f;
+    const EnvironmentLight light(sky);
+    const double found = (light.skySampled() ? sampled(light, false) : 0.0) + (light.sunSampled() ? sampled(light, true) : 0.0);
+    EXPECT_NEAR(found / integrate(sky, light).light, 1.0, 3e-3) << width;
+    if (width > 100) continue;
+    // Less than half a cell beside a place a bilinear interpolant of values below 3 differs by 3 / (pixels per cell).
+    for (std::uint32_t i = 0; i < 256; ++i) {
+      const Vec3 w = directionFromZ(2.0f * sobol2D(i, 5).x - 1.0f, sobol2D(i, 5).y);
+      EXPECT_NEAR(light.radiance(w).x, environmentRadiance(sky, w).x, 3.0f * static_cast<float>(width) / 512) << width;
+    }
+  }
+}
+
+TEST(EnvironmentLight, LanesGiveWhatSingleDirectionsDo) {
+  const Environment sky = patchySky();
+  const EnvironmentLight light(sky);
+  for (std::uint32_t i = 0; i < 256; ++i) {
+    UnitSquareLanes u;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const Vec2 point = sobol2D(i * kLanes + static_cast<std::uint32_t>(lane), 9);
+      u.x[lane] = point.x;
+      u.y[lane] = point.y;
+    }
+    for (const bool sun : {true, false}) {
+      LightSampleLanes samples;
+      sun ? light.sampleSun(u, samples) : light.sampleSky(u, samples);
+      alignas(64) float gathered[kLanes];
+      for (std::size_t lane = 0; lane < kLanes; ++lane) gathered[lane] = 0.1f * static_cast<float>(lane + 1);
+      Vec3Lanes arriving;
+      light.arriving(samples.wi, gathered, arriving);
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        const Vec2 point(u.x[lane], u.y[lane]);
+        const LightSample one = sun ? light.sampleSun(point) : light.sampleSky(point);
+        EXPECT_EQ(samples.wi[lane], one.wi);
+        EXPECT_EQ(samples.weight[lane], one.weight);
+        EXPECT_EQ(samples.pdf[lane], one.pdf);
+        EXPECT_EQ(arriving[lane], light.arriving(one.wi, gathered[lane]));
+        EXPECT_EQ(arriving[lane], light.radiance(one.wi) * misWeight(gathered[lane], light.pdf(one.wi)));
+      }
+    }
+  }
+}
+
 TEST(EnvironmentLight, NothingIsBuiltWithoutAnImage) {
   const EnvironmentLight black((Environment()));
   EXPECT_FALSE(black.shines());

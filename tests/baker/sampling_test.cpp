@@ -142,6 +142,42 @@ TEST(Distribution, RestReusesTheNumber) {
   EXPECT_LT(d.rest(0x1.fffffep-1f, 1), 1.0f);
 }
 
+// Rows of 1000 weights, not a power of two, so that u times their number is rounded; the last u is the one that would
+// round up to 1000. What is chosen holds u, from any row, and lanes give what single numbers do.
+TEST(Distribution, RowsSideBySide) {
+  constexpr std::size_t kSize = 1000, kRows = 3;
+  std::vector<float> weights(kSize * kRows);
+  for (std::size_t i = 0; i < kSize; ++i) {
+    weights[i] = 1.0f;
+    weights[kSize + i] = i < 900 ? 1e-9f : 1.0f;  // most of a guide's places point to the end
+    weights[2 * kSize + i] = 0.0f;
+  }
+  const Distribution d(weights, kRows);
+  EXPECT_TRUE(d.empty(2) && !d.empty(1) && d.empty(3));
+  for (std::uint32_t i = 0; i < 4096; ++i) {
+    std::array<float, kLanes> u;
+    LaneFlags rows;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      u[lane] = sobol1D(i * kLanes + static_cast<std::uint32_t>(lane), 3);
+      rows[lane] = static_cast<int>(lane % 2);
+    }
+    if (i == 0) u[0] = u[1] = 0.0f;
+    if (i == 1) u[0] = u[1] = 0x1.fffffep-1f;
+    Distribution::Lanes chosen;
+    d.choose(u.data(), rows, chosen);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const auto row = static_cast<std::size_t>(rows[lane]);
+      const std::size_t index = d.choose(u[lane], row);
+      ASSERT_EQ(static_cast<std::size_t>(chosen.index[lane]), index);
+      EXPECT_EQ(chosen.rest[lane], d.rest(u[lane], index, row));
+      float before = 0.0f;  // sums of multiples of 2^-24 are exact
+      for (std::size_t k = 0; k < index; ++k) before += d.probability(k, row);
+      ASSERT_LE(before, u[lane]);
+      ASSERT_LT(u[lane], before + d.probability(index, row));
+    }
+  }
+}
+
 TEST(Distribution, DegenerateWeights) {
   EXPECT_TRUE(Distribution().empty());
   EXPECT_TRUE(Distribution(std::vector<float>{}).empty());
