@@ -53,17 +53,25 @@ void DoublingError::addPage(const PageTexels& page) {
 }
 
 void DoublingError::add(std::size_t index, std::span<const float> before, std::span<const float> now, std::uint32_t n0,
-                        std::uint32_t n1) {
+                        std::uint32_t n1, std::uint32_t leftOut) {
   Run& run = runs_[index];
   // now - before is d for equal halves; independent samples would have the same expectation with others by this.
   const double scale = std::sqrt(static_cast<double>(n0) / n1);
   double sum = 0.0;
+  double sumBefore = 0.0;
+  run.counting = 0;
   for (std::size_t i = 0; i < run.count; ++i) {
+    if ((leftOut >> i) & 1u) {
+      squares_[run.first + i] = sums_[run.first + i] = kLeftOut;
+      continue;
+    }
+    ++run.counting;
+    sumBefore += static_cast<double>(squares_[run.first + i]);
     const double d = (static_cast<double>(now[i]) - static_cast<double>(before[i])) * scale;
     squares_[run.first + i] = static_cast<float>(d * d);
     sum += d * d;
   }
-  run.movedBefore = n0 == n1 ? run.moved : -1.0;
+  run.movedBefore = n0 == n1 && run.moved >= 0.0 ? sumBefore : -1.0;
   run.moved = n0 == 0 ? -1.0 : sum;
   run.samplesBefore = n0;
   run.samples = n0 + n1;
@@ -85,12 +93,13 @@ void DoublingError::endPass(const std::vector<std::uint8_t>& live) {
     const auto fall = static_cast<float>(std::pow(static_cast<double>(run.samplesBefore) / run.samples, rate_));
     double sum = 0.0;
     for (std::size_t t = run.first; t < run.first + run.count; ++t) {
+      if (sums_[t] == kLeftOut) continue;
       sums_[t] = sums_[t] * fall + squares_[t];
       sum += static_cast<double>(sums_[t]);
     }
     ++run.doublings;
     run.factor = factor;
-    run.meanSquare = sum / (static_cast<double>(run.count) * run.doublings);
+    run.meanSquare = sum / (std::max(1u, run.counting) * static_cast<double>(run.doublings));
   }
   parallelFor(runs_.size(), 256, [&](std::size_t first, std::size_t last) {
     for (std::size_t r = first; r < last; ++r)
@@ -108,16 +117,17 @@ double DoublingError::poolAround(std::size_t index) const {
     // A run that was done earlier has fewer samples.
     const double fall =
         near.samples == run.samples ? 1.0 : std::pow(static_cast<double>(near.samples) / run.samples, rate_);
-    pooled += near.meanSquare * near.count * fall;
-    texels += near.count;
+    pooled += near.meanSquare * near.counting * fall;
+    texels += near.counting;
   }
-  return pooled / texels;
+  return texels > 0.0 ? pooled / texels : 0.0;
 }
 
 float DoublingError::standardError(std::size_t index, std::size_t i) const {
   const Run& run = runs_[index];
   if (run.doublings == 0) return 0.0f;
-  const double moved = (static_cast<double>(sums_[run.first + i]) + kPrior * run.pool) / (run.doublings + kPrior);
+  const auto own = static_cast<double>(sums_[run.first + i]);
+  const double moved = own < 0.0 ? run.pool : (own + kPrior * run.pool) / (run.doublings + kPrior);
   return static_cast<float>(std::sqrt(run.factor * moved));
 }
 

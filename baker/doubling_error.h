@@ -34,9 +34,10 @@ class DoublingError {
   DoublingError(const std::vector<PageTexels>& pages, double credit);
 
   /// The means of a run's texels were `before` from n0 samples and are `now` from n1 more as well. Runs may be called
-  /// from several threads at once.
+  /// from several threads at once. `leftOut`: bit i is set where texel i took no samples; it never does again, and is
+  /// given the error of those around it.
   void add(std::size_t run, std::span<const float> before, std::span<const float> now, std::uint32_t n0,
-           std::uint32_t n1);
+           std::uint32_t n1, std::uint32_t leftOut = 0);
   /// Ends a pass in which every run of `live` was added with the same n0 and n1: measures the rate, renews the errors.
   void endPass(const std::vector<std::uint8_t>& live);
 
@@ -51,6 +52,7 @@ class DoublingError {
   struct Run {
     std::size_t first = 0;
     std::uint32_t count = 0;
+    std::uint32_t counting = 0;  // texels not left out
     std::uint32_t samples = 0;
     std::uint32_t samplesBefore = 0;
     int doublings = 0;
@@ -67,6 +69,7 @@ class DoublingError {
   std::vector<std::array<std::uint32_t, 9>> around_;
   std::vector<float> squares_;  // of the last pass: d^2
   std::vector<float> sums_;     // of d^2 over all passes, each scaled to the samples of the last
+  static constexpr float kLeftOut = -1.0f;  // both
   double credit_;
   double rate_ = 1.0;
 };

@@ -3,6 +3,7 @@
 #include <xmmintrin.h>
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 
@@ -26,6 +27,14 @@ constexpr int kMostSweeps = 256;
 constexpr int kLongestPath = 64;
 constexpr std::size_t kSweepGrain = 4096;
 constexpr std::size_t kWaveGrain = kSweepGrain / kLanes;
+/// Whether more or less than half of a texel's rays meet backs is certain where the lead squared, in rays, is this many
+/// times their number: 2.8 standard deviations of a fair coin, and what eight rays of eight have.
+constexpr double kCertain = 8.0;
+/// A texel more of which sees nothing but backs is invalid. Where its chart has no better ones it may be in a room that
+/// is inside out, and all that it found counts.
+constexpr float kMostInside = 0.6f;
+/// Inside of something whose chart nobody sees texels darker than this share of the mean need no more samples.
+constexpr double kDarkInside = 0.01;
 
 CacheLevels levelsFor(int bounces) {
   if (bounces < 0) return {.count = 1, .base = 0, .endless = true};
@@ -78,7 +87,9 @@ GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKer
 
 void GatherIntegrator::makeCache() {
   backFaces_.resize(map_.size());
-  place_.resize(map_.size(), TexelPlace::Open);
+  samplesOf_.resize(map_.size());
+  buried_.resize(map_.size());
+  warmBacks_.resize(map_.size());
   if (scene_.levels.count == 0) return;
   reflectance_.resize(map_.size());
   if (!scene_.levels.endless) cache_.resize(map_.size() * stored());  // else it is what the warm-up ends with
@@ -92,7 +103,7 @@ void GatherIntegrator::makeSums() {
   const std::size_t count = map_.size();
   sums_.resize(count);
   coverage_.resize(count);
-  samplesOf_.resize(count);
+  inside_.resize(count);
   if (!scene_.levels.endless) levelSums_.resize(count * stored());
   probes_.resize(probeCount_);
   if (!scene_.strategies.empty()) spreads_.resize(waves_.size() * (scene_.strategies.size() + 1));
@@ -196,7 +207,8 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
       reflectance_[start + i] = warm[i].reflectance;
       first[start + i] = warm[i].direct + warm[i].seen;
       constant[start + i] = first[start + i] + warm[i].relit;
-      backFaces_[start + i] = warm[i].backFaces;
+      warmBacks_[start + i] = static_cast<std::uint8_t>(warm[i].backs);
+      backFaces_[start + i] = static_cast<std::uint32_t>(std::popcount(warm[i].backs));
       if (!scene_.indirectOnly) continue;
       direct_[start + i] = warm[i].direct;
       seen_[start + i] = warm[i].seen * static_cast<float>(GatherWave::kWarmRays);
@@ -204,11 +216,13 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
     return counts;
   });
   if (!traced) return traced;
+  std::fill(samplesOf_.begin(), samplesOf_.end(), std::uint32_t{GatherWave::kWarmRays});
   findBuried();
-  substituteInvalid(std::vector<std::uint32_t>(count, GatherWave::kWarmRays));
+  substituteInvalid();
   solveLinks(links, std::move(first), constant);
   scene_.reflectance = reflectance_;
-  std::fill(backFaces_.begin(), backFaces_.end(), 0u);
+  for (std::size_t t = 0; t < count; ++t)
+    if (!buried_[t]) backFaces_[t] = samplesOf_[t] = 0;
   return {};
 }
 
@@ -268,15 +282,20 @@ Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Pr
     const Wave& wave = waves_[w];
     if (wave.done) return GatheredWave{};
     const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
-    GatherWave texels(scene_, wave.page, wave.first, wave.count);
-    GatheredWave done = texels.gather(first, end, cache_, std::span(place_).subspan(start, wave.count), spreadsOf(w));
-    for (std::size_t i = 0; i < wave.count; ++i) coverage_[start + i] = texels.coverage(i);
+    const std::span buried = std::span(buried_).subspan(start, wave.count);
+    GatheredWave done;
+    if (first == 0 || std::ranges::count(buried, 0) > 0) {
+      GatherWave texels(scene_, wave.page, wave.first, wave.count);
+      done = texels.gather(first, end, cache_, buried, spreadsOf(w));
+      for (std::size_t i = 0; i < wave.count; ++i) coverage_[start + i] = texels.coverage(i);
+    }
     store(w, done, first, end);
-    std::fill_n(samplesOf_.begin() + map_.firstOfPage(wave.page) + wave.first, wave.count, end);
     progress.advance(std::uint64_t{wave.count} * (end - first));
     return done;
   });
   if (!traced) return traced;
+  if (first == 0) warmBacks_ = std::vector<std::uint8_t>();
+  findBuried();
   estimateErrors();
   return {};
 }
@@ -285,9 +304,15 @@ void GatherIntegrator::store(std::size_t index, const GatheredWave& done, std::u
   const Wave& wave = waves_[index];
   std::array<float, kLanes> before{};
   std::array<float, kLanes> now{};
+  std::uint32_t leftOut = 0;
   const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
   for (std::size_t i = 0; i < wave.count; ++i) {
     const GatheredTexel& texel = done.texels[i];
+    if (buried_[start + i]) {
+      leftOut |= 1u << i;
+      continue;
+    }
+    samplesOf_[start + i] = end;
     Vec3& flat = sums_.flat[start + i];
     before[i] = luminance(flat) / static_cast<float>(std::max(1u, first));
     flat += Vec3(texel.flat);
@@ -296,17 +321,27 @@ void GatherIntegrator::store(std::size_t index, const GatheredWave& done, std::u
     for (std::size_t k = 0; k < 3; ++k) sums_.rnm[k][start + i] += Vec3(texel.rnm[k]);
     if (!scene_.levels.endless)
       for (std::size_t l = 0; l < stored(); ++l) levelSums_[(start + i) * stored() + l] += Vec3(texel.levels[l]);
-    backFaces_[start + i] += place_[start + i] == TexelPlace::Buried ? end - first : texel.backFaces;
+    backFaces_[start + i] += texel.backFaces;
+    // The warm-up's rays and the first samples come from the same points.
+    if (first == 0 && end >= GatherWave::kWarmRays && stored() > 0)
+      inside_[start + i].addPairs(warmBacks_[start + i], texel.firstBacks);
+    inside_[start + i].add(texel.inside);
     if ((wave.first + i) % PathIntegrator::kProbeStride == 0)
       for (std::size_t k = 0; k < kProbeNormals; ++k)
         probes_[probeOf(wave.page, wave.first + i)][k] += Vec3(texel.probes[k]);
   }
-  errors_->add(index, before, now, first, end - first);
+  errors_->add(index, before, now, first, end - first, leftOut);
 }
 
-void GatherIntegrator::substituteInvalid(std::span<const std::uint32_t> rays) {
+float GatherIntegrator::weightOf(std::size_t texel) const {
+  const auto samples = static_cast<float>(std::max(1u, samplesOf_[texel]));
+  const float inside = inside_[texel].share() * static_cast<float>(backFaces_[texel]);
+  return inside > kMostInside * samples ? samples : samples - inside;
+}
+
+void GatherIntegrator::substituteInvalid() {
   std::vector<std::uint8_t> valid(map_.size());
-  for (std::size_t t = 0; t < valid.size(); ++t) valid[t] = 2 * backFaces_[t] <= rays[t] ? 1 : 0;
+  for (std::size_t t = 0; t < valid.size(); ++t) valid[t] = 2 * backFaces_[t] <= samplesOf_[t] ? 1 : 0;
   substitutes_ = map_.substitutes(valid);
 }
 
@@ -314,24 +349,35 @@ void GatherIntegrator::findBuried() {
   std::vector<std::uint8_t> hidden(map_.size());
   std::vector<std::uint8_t> valid(map_.size());
   for (std::size_t t = 0; t < valid.size(); ++t) {
-    hidden[t] = backFaces_[t] >= GatherWave::kWarmRays ? 1 : 0;
-    valid[t] = 2 * backFaces_[t] <= GatherWave::kWarmRays ? 1 : 0;
+    const double lead = 2.0 * backFaces_[t] - samplesOf_[t];  // of rays that meet backs
+    const bool certain = lead * lead >= kCertain * samplesOf_[t];
+    hidden[t] = certain && lead > 0.0 ? 1 : 0;
+    valid[t] = certain && lead < 0.0 ? 1 : 0;
   }
-  const std::vector<std::uint8_t> buried = map_.buried(hidden, valid);
-  const std::vector<std::uint8_t> edge = map_.besideBuried(buried);
-  for (std::size_t t = 0; t < place_.size(); ++t)
-    place_[t] = buried[t] ? TexelPlace::Buried : edge[t] ? TexelPlace::Edge : TexelPlace::Open;
+  const std::vector<std::uint8_t> replaced = map_.buried(hidden, valid);
+  const double dark = darkFloor(kDarkInside);
+  for (std::size_t t = 0; t < buried_.size(); ++t) {
+    const bool judged = hidden[t] && samplesOf_[t] >= kFirstJudged;
+    if (replaced[t] || (judged && static_cast<double>(luminance(meanLight(t))) < dark)) buried_[t] = 1;
+  }
+}
+
+double GatherIntegrator::darkFloor(double share) const {
+  double total = 0.0;
+  if (!sums_.flat.empty())
+    for (std::size_t t = 0; t < map_.size(); ++t) total += static_cast<double>(luminance(meanLight(t)));
+  return share * total / static_cast<double>(std::max<std::size_t>(1, map_.size()));
 }
 
 Vec3 GatherIntegrator::lightOf(std::size_t texel, std::size_t level) const {
   const Vec3& sum = scene_.levels.endless ? sums_.flat[texel] : levelSums_[texel * stored() + level];
-  const Vec3 gathered = sum / static_cast<float>(std::max(1u, weightOf(texel)));
+  const Vec3 gathered = sum / weightOf(texel);
   if (!scene_.indirectOnly) return gathered;
-  return gathered + direct_[texel] + seen_[texel] / static_cast<float>(GatherWave::kWarmRays + weightOf(texel));
+  return gathered + direct_[texel] + seen_[texel] / (static_cast<float>(GatherWave::kWarmRays) + weightOf(texel));
 }
 
 void GatherIntegrator::renewCache() {
-  substituteInvalid(samplesOf_);
+  substituteInvalid();
   // The lowest level stays as the warm-up left it where it stands on others that are not kept.
   const std::size_t firstLevel = scene_.levels.base > 0 ? 1 : 0;
   parallelFor(map_.size(), kSweepGrain, [&](std::size_t first, std::size_t last) {
@@ -349,11 +395,14 @@ void GatherIntegrator::estimateErrors() {
   errors_->endPass(live);
 }
 
+float GatherIntegrator::errorOf(std::size_t wave, std::size_t i) const {
+  const std::size_t t = map_.firstOfPage(waves_[wave].page) + waves_[wave].first + i;
+  return errors_->standardError(wave, i) * static_cast<float>(samplesOf_[t]) / weightOf(t);
+}
+
 double GatherIntegrator::markDone() {
-  double total = 0.0;
   const std::size_t count = map_.size();
-  for (std::size_t t = 0; t < count; ++t) total += static_cast<double>(luminance(sums_.flat[t])) / samplesOf_[t];
-  const double floor = kDarkFloor * total / static_cast<double>(std::max<std::size_t>(1, count));
+  const double floor = darkFloor(kDarkFloor);
   std::size_t met = 0;
   std::vector<std::uint8_t> meets(waves_.size());
   for (std::size_t w = 0; w < waves_.size(); ++w) {
@@ -362,9 +411,9 @@ double GatherIntegrator::markDone() {
     std::size_t metHere = 0;
     for (std::size_t i = 0; i < wave.count; ++i) {
       const std::size_t t = start + i;
-      const double light = static_cast<double>(luminance(sums_.flat[t])) / samplesOf_[t];
+      const auto light = static_cast<double>(luminance(meanLight(t)));
       const bool inside = 2 * backFaces_[t] > samplesOf_[t];
-      metHere += inside || static_cast<double>(errors_->standardError(w, i)) <=
+      metHere += inside || static_cast<double>(errorOf(w, i)) <=
                                static_cast<double>(options_.targetError) * std::max(light, floor);
     }
     meets[w] = wave.done || metHere == wave.count;
@@ -381,7 +430,7 @@ TexelLight GatherIntegrator::takeLight() {
   TexelLight light = std::move(sums_);
   parallelFor(map_.size(), kSweepGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t t = first; t < last; ++t) {
-      const float scale = 1.0f / static_cast<float>(std::max(1u, weightOf(t)));
+      const float scale = 1.0f / weightOf(t);
       light.flat[t] *= scale;
       for (std::vector<Vec3>& map : light.rnm) map[t] *= scale;
     }
@@ -391,13 +440,13 @@ TexelLight GatherIntegrator::takeLight() {
 
 BakedTexel GatherIntegrator::texel(std::uint32_t page, std::size_t index) const {
   const std::size_t t = map_.firstOfPage(page) + index;
-  const float scale = 1.0f / static_cast<float>(std::max(1u, weightOf(t)));
+  const float scale = 1.0f / weightOf(t);
   BakedTexel baked;
   baked.coverage = coverage_[t];
   const auto taken = static_cast<float>(std::max(1u, samplesOf_[t]));
   baked.validity = 1.0f - static_cast<float>(backFaces_[t]) / taken;
-  baked.standardError = errors_->standardError(firstWave_[page] + index / kLanes, index % kLanes) * taken * scale;
-  if (coverage_[t] > 0.0f) baked.samples = place_[t] == TexelPlace::Buried ? GatherWave::kWarmRays : samplesOf_[t];
+  baked.standardError = errorOf(firstWave_[page] + index / kLanes, index % kLanes);
+  if (coverage_[t] > 0.0f) baked.samples = samplesOf_[t];
   baked.probed = index % PathIntegrator::kProbeStride == 0;
   if (baked.probed)
     for (std::size_t k = 0; k < kProbeNormals; ++k) baked.probes[k] = probes_[probeOf(page, index)][k] * scale;

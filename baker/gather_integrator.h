@@ -74,9 +74,10 @@ struct WarmLinks {
 /// exactly N bounces. Of more than CacheLevels::kMost levels the highest are kept, and the lowest of these stays as the
 /// warm-up left it.
 ///
-/// Texels inside of something (all rays of the warm-up meet backs of single-sided surfaces) are not gathered for where
-/// their chart has others: what becomes of them is the finishing's business. Of texels beside them the parts that are
-/// inside do not count: samples whose ray meets a back are left out of the mean.
+/// Texels inside of something (clearly more than half of their rays so far meet backs of single-sided surfaces) are no
+/// longer gathered for where their chart has valid ones: what becomes of them is the finishing's business. Where their
+/// chart has none, those that stay dark are not. Of other texels the parts that are inside do not count: the mean is
+/// over samples from footprint points in the open.
 ///
 /// Errors: DoublingError. With a target a wave of texels is done when each of its texels meets it; texels inside of
 /// something (validity under one half) are not judged.
@@ -115,14 +116,16 @@ class GatherIntegrator {
   Expected<void> pass(std::uint32_t first, std::uint32_t end, Progress& progress);
   void store(std::size_t wave, const GatheredWave& done, std::uint32_t first, std::uint32_t end);
   void renewCache();
-  /// `rays`: gather rays of each texel.
-  void substituteInvalid(std::span<const std::uint32_t> rays);
-  /// Tells by the warm-up's rays which texels lie inside of something.
+  void substituteInvalid();
+  /// Tells by the rays so far which texels lie inside of something.
   void findBuried();
-  /// Samples of a texel that count.
-  std::uint32_t weightOf(std::size_t texel) const {
-    return samplesOf_[texel] - (place_[texel] == TexelPlace::Edge ? std::min(samplesOf_[texel], backFaces_[texel]) : 0);
-  }
+  /// Samples of a texel that count: those from points in the open.
+  float weightOf(std::size_t texel) const;
+  /// Irradiance / pi of the maps.
+  Vec3 meanLight(std::size_t texel) const { return sums_.flat[texel] / weightOf(texel); }
+  /// `share` of the mean over all texels; 0 before there are samples.
+  double darkFloor(double share) const;
+  float errorOf(std::size_t wave, std::size_t i) const;
   /// Irradiance / pi as of level `level`, from all samples so far.
   Vec3 lightOf(std::size_t texel, std::size_t level) const;
   std::size_t probeOf(std::uint32_t page, std::size_t index) const {
@@ -151,7 +154,9 @@ class GatherIntegrator {
   std::vector<Vec3> cache_;  // levels.count per texel
   std::vector<float> coverage_;
   std::vector<std::uint32_t> backFaces_;
-  std::vector<TexelPlace> place_;
+  std::vector<std::uint8_t> buried_;     // nothing more is gathered for them
+  std::vector<std::uint8_t> warmBacks_;  // bits of the warm-up's rays, until the first pass is done
+  std::vector<InsideTally> inside_;
   std::vector<std::array<Vec3, kProbeNormals>> probes_;
   std::vector<std::size_t> firstProbe_;  // per page
   std::size_t probeCount_ = 0;

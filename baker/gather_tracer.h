@@ -33,7 +33,7 @@ struct Flight {
 ///   light(flight, radiance, depth)   radiance that exists for bakes of `depth` indirect bounces and more
 ///   texel(flight, texel)             the flight ended on this texel
 ///   prefetch(texel)                  texel(...) will probably be called with it
-///   backFace(flight) -> bool         a gather ray met the back of a single-sided surface; whether to go on from there
+///   backFace(flight)                 a gather ray met the back of a single-sided surface
 template <class Sink>
 class GatherTracer {
  public:
@@ -76,9 +76,8 @@ class GatherTracer {
       return;
     }
     const HitSurface hit = transport_.rays.surfaceAt(packet, lane);
-    if (flight.depth == 0 && hit.backFace && !transport_.materials.material(hit.material).doubleSided &&
-        !sink_.backFace(flight))
-      return;
+    if (flight.depth == 0 && hit.backFace && !transport_.materials.material(hit.material).doubleSided)
+      sink_.backFace(flight);
     if (emits) {
       const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
       if (emitted != Vec3(0.0f))

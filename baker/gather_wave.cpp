@@ -29,9 +29,8 @@ struct WarmSink {
     links[flight.lane * GatherWave::kWarmRays + flight.sample] = {texel, packWeight(flight.beta)};
   }
   void prefetch(std::uint32_t) const {}
-  bool backFace(const Flight& flight) {
-    ++texels[flight.lane].backFaces;
-    return true;
+  void backFace(const Flight& flight) {
+    texels[flight.lane].backs |= 1u << flight.sample;
   }
 };
 
@@ -44,12 +43,13 @@ struct GatherSink {
   GatheredWave& result;
   std::uint32_t page;
   std::span<const TexelCoord> coords;
-  std::span<const TexelPlace> places;
   std::size_t probedLane = kLanes;  // at most one texel of a wave is probed
   MapSums sums{};
   MapTotals totals{};
   bool tallied = false;  // whether the gather rays are
   LightTally rays{};
+  std::size_t point = 0;  // the footprint point that rays come from
+  std::array<std::array<std::uint8_t, WavePoints::kMost>, kLanes> backs{};  // rays of a net that met backs, by point
 
   /// Radiance that a texel reflects, by level.
   const Vec3* reflectedBy(std::uint32_t texel) const {
@@ -127,9 +127,20 @@ struct GatherSink {
     }
     passOnLevels(flight.lane, flight.dirTangent, flight.beta, texel, flight.depth);
   }
-  bool backFace(const Flight& flight) {
+  void backFace(const Flight& flight) {
     ++result.texels[flight.lane].backFaces;
-    return places[flight.lane] != TexelPlace::Edge;
+    ++backs[flight.lane][point];
+  }
+
+  /// Ends a net.
+  void judgePoints(const NetRange& net) {
+    const std::uint32_t each = net.count() / WavePoints::kMost;
+    for (std::size_t lane = 0; lane < coords.size(); ++lane) {
+      if (each >= 2) result.texels[lane].inside.addNet(backs[lane], each);
+      for (std::uint32_t i = net.first; i < std::min(net.first + net.count(), std::uint32_t{GatherWave::kWarmRays}); ++i)
+        result.texels[lane].firstBacks |= std::uint32_t{backs[lane][i - net.first]} << i;
+    }
+    backs = {};
   }
 
   /// Hands the sums over to the result.
@@ -272,11 +283,11 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
 }
 
 GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const Vec3> cache,
-                                std::span<const TexelPlace> places, std::span<LightSpread> spreads) {
+                                std::span<const std::uint8_t> buried, std::span<LightSpread> spreads) {
   GatheredWave result;
-  GatherSink sink{scene_, cache, result, page_, std::span(scene_.texels[page_].coords).subspan(first_, count_), places};
+  GatherSink sink{scene_, cache, result, page_, std::span(scene_.texels[page_].coords).subspan(first_, count_)};
   for (std::size_t lane = 0; lane < count_; ++lane)
-    if (places[lane] == TexelPlace::Buried) points_.leaveOut(lane);
+    if (buried[lane]) points_.leaveOut(lane);
   for (std::size_t lane = 0; lane < count_; ++lane) covered_[lane] = points_.covered(lane);
   coveredCount_ = static_cast<std::size_t>(std::count(covered_.begin(), covered_.end(), true));
   if (coveredCount_ == 0) return result;
@@ -377,15 +388,19 @@ void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
     if ((packet(3).cell & 15u) == 15u) settle(sink.sums, sink.totals);
   }
   tracer.finish();
+  sink.judgePoints(net);
   settle(sink.sums, sink.totals);
   sink.result.rays += tracer.rays();
   sink.result.shadowRays += tracer.shadowRays();
 }
 
-/// Sends the rays of all lanes into one cell of the net. They share the number of their footprint point too: any 16
-/// neighbouring cells use all points of a texel.
+/// The footprint point of the rays into a cell: any 16 neighbouring cells use all points of a texel, and where a point has
+/// two rays they go to opposite sides.
+static std::uint32_t pointOf(std::uint32_t cell) { return cell ^ ((cell >> 1) & 8u); }
+
+/// Sends the rays of all lanes into one cell of the net.
 void GatherWave::launch(Packet& packet) {
-  aimGatherRays(net_.x(packet.cell), net_.y(packet.cell), points_[packet.cell], packet.rays);
+  aimGatherRays(net_.x(packet.cell), net_.y(packet.cell), points_[pointOf(packet.cell)], packet.rays);
   scene_.transport.rays.intersect(packet.rays.packet, scene_.gatherMode.value_or(pilot_.mode()));
   pilot_.see(packet.rays.packet);
   scene_.map.findTriangles(packet.rays.packet, packet.lookup);
@@ -410,8 +425,9 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
       if (level >= 0) light.set(lane, beta * sink.reflectedBy(texel)[level]);
       sink.passOnLevels(lane, rays.dirTangent[lane], Vec3(beta), texel, 0);
     } else if (rays.packet.hit(static_cast<int>(lane))) {
+      sink.point = pointOf(packet.cell) % WavePoints::kMost;
       tracer.arrive(rays.packet, static_cast<int>(lane),
-                    flightOf(lane, net_.sample(packet.cell, lane), points_[packet.cell], rays));
+                    flightOf(lane, net_.sample(packet.cell, lane), points_[pointOf(packet.cell)], rays));
     } else if (shines) {
       light.set(lane, beta * sky[lane]);
       if (!isFinite(light[lane])) continue;

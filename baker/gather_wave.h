@@ -10,6 +10,7 @@
 
 #include "baker/gather_kernels.h"
 #include "baker/gather_tracer.h"
+#include "baker/inside_points.h"
 #include "baker/light_effort.h"
 #include "baker/path_integrator.h"
 #include "baker/stratified_net.h"
@@ -70,9 +71,6 @@ class CoherencePilot {
   int changes_ = kMemory * kLanes;  // times kMemory
 };
 
-/// Where a texel lies: in the open; partly inside of something; or wholly, where no light is gathered.
-enum class TexelPlace : std::uint8_t { Open, Edge, Buried };
-
 /// What the texels of a wave gathered in one pass: sums over its samples.
 struct GatheredTexel {
   Vec3d flat{0};
@@ -81,6 +79,8 @@ struct GatheredTexel {
   std::array<Vec3d, kProbeNormals> probes{};       // where the texel is probed
   Vec3d seen{0};  // with GatherScene::indirectOnly: flat light from what rays see shine by itself, not in the maps
   std::uint32_t backFaces = 0;
+  std::uint32_t firstBacks = 0;  // bits of the first kWarmRays samples, each from a point of its own
+  InsideTally inside;            // of nets with two rays and more from each point
 };
 
 struct GatheredWave {
@@ -104,7 +104,7 @@ struct WarmTexel {
   Vec3 direct{0};       // irradiance / pi from light samples
   Vec3 seen{0};         // the same from what rays see shine by itself
   Vec3 relit{0};        // the same from hits without texels: light of one bounce and more
-  std::uint32_t backFaces = 0;
+  std::uint32_t backs = 0;  // bits of the rays that met backs
 };
 
 struct GatherSink;
@@ -124,11 +124,11 @@ class GatherWave {
   std::array<WarmTexel, kLanes> warmUp(std::span<CacheLink> links, GatheredWave& counts);
 
   /// Samples [first, end) of every covered texel. `cache`: levels.count values per texel of the map: the radiance
-  /// that the texel reflects. `places`: one per texel of the wave; nothing is gathered for buried ones, and at an edge
-  /// rays that meet backs bring nothing. `spreads`: what the wave remembers of its light from pass to pass: of each of
-  /// GatherScene::strategies, and last of the gather rays; empty without strategies.
+  /// that the texel reflects. `buried`: one per texel of the wave; nothing is gathered for those. `spreads`: what the
+  /// wave remembers of its light from pass to pass: of each of GatherScene::strategies, and last of the gather rays;
+  /// empty without strategies.
   GatheredWave gather(std::uint32_t first, std::uint32_t end, std::span<const Vec3> cache,
-                      std::span<const TexelPlace> places, std::span<LightSpread> spreads);
+                      std::span<const std::uint8_t> buried, std::span<LightSpread> spreads);
 
  private:
   Vec3 meanReflectance(std::size_t lane) const;

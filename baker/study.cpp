@@ -84,12 +84,15 @@ struct Maps {
 
 using Mask = std::vector<std::vector<std::uint8_t>>;
 
+/// Texels that path tracing and the gather mean the same by: where part of one is inside of something path tracing counts
+/// that part.
 Mask validTexels(const std::vector<BakedPage>& pages) {
+  constexpr float kLeastValidity = 0.99f;
   Mask mask;
   for (const BakedPage& page : pages) {
     std::vector<std::uint8_t>& m = mask.emplace_back();
     for (std::size_t i = 0; i < page.aux.pixels.size(); i += 4)
-      m.push_back(page.aux.pixels[i] > 0.0f && page.aux.pixels[i + 1] >= 0.5f);
+      m.push_back(page.aux.pixels[i] > 0.0f && page.aux.pixels[i + 1] >= kLeastValidity);
   }
   return mask;
 }

@@ -205,23 +205,6 @@ std::vector<std::uint8_t> TexelMap::buried(std::span<const std::uint8_t> hidden,
   return found;
 }
 
-std::vector<std::uint8_t> TexelMap::besideBuried(std::span<const std::uint8_t> buried) const {
-  std::vector<std::uint8_t> beside(size(), 0);
-  for (std::size_t p = 0; p < texels_.size(); ++p)
-    for (std::size_t i = 0; i < texels_[p].size(); ++i) {
-      if (!buried[firstOfPage_[p] + i]) continue;
-      const std::uint32_t chart = chartOf(texels_[p], i);
-      for (int dy = -1; dy <= 1; ++dy)
-        for (int dx = -1; dx <= 1; ++dx) {
-          const TexelCoord c = texels_[p].coords[i];
-          const std::uint32_t found = at(pages_[p], c.x + dx, c.y + dy);
-          if (found != kNoTexel && !buried[found] && chartOf(texels_[p], found - firstOfPage_[p]) == chart)
-            beside[found] = 1;
-        }
-    }
-  return beside;
-}
-
 std::vector<TexelMap::Substitute> TexelMap::substitutes(std::span<const std::uint8_t> valid) const {
   std::vector<Substitute> all;
   for (std::uint32_t t = 0; t < valid.size(); ++t)

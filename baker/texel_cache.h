@@ -61,8 +61,6 @@ class TexelMap {
 
   /// Of the texels that are `hidden` for certain, those whose chart has one that is `valid`.
   std::vector<std::uint8_t> buried(std::span<const std::uint8_t> hidden, std::span<const std::uint8_t> valid) const;
-  /// Texels that are not buried themselves but beside one of their chart that is.
-  std::vector<std::uint8_t> besideBuried(std::span<const std::uint8_t> buried) const;
 
  private:
   struct alignas(32) Triangle {

@@ -26,7 +26,7 @@ constexpr std::uint32_t kFootprint = kLightPatterns;
 constexpr std::uint32_t kDirection = kLightPatterns + 1;
 constexpr std::uint32_t kPoints = WavePoints::kMost;
 
-constexpr std::array<TexelPlace, kLanes> kOpen{};
+constexpr std::array<std::uint8_t, kLanes> kOpen{};
 
 enum Place : int { Rooms, Foliage };
 
