@@ -187,7 +187,7 @@ class AtlasBuilder {
         for (const Vec2 uv : chart.uvs) uvs.push_back(Vec2(place.apply(uv) / size));
         keepAreasAfterRounding(uvs, chart.corners, size);
         for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
-          const SourceTriangle& source = layout.source[chart.triangles[t]];
+          const SourceTriangle source = layout.source[chart.triangles[t]];
           PlacedTriangle triangle{source.primitive, source.triangle, firstPage + place.page, index, {}};
           std::array<Vec2d, 3> corners;
           for (std::size_t k = 0; k < 3; ++k) {

@@ -25,7 +25,11 @@ class BorderGraph {
  public:
   using Index = std::uint32_t;
 
-  explicit BorderGraph(std::size_t regions) : lists_(regions) {}
+  /// `borders`: how many there may be, where that is known.
+  explicit BorderGraph(std::size_t regions, std::size_t borders = 0) : lists_(regions) {
+    borders_.reserve(borders);
+    links_.reserve(borders);
+  }
 
   std::size_t size() const { return borders_.size(); }
   Border& operator[](Index border) { return borders_[border]; }
@@ -172,7 +176,7 @@ class BorderQueue {
   template <class Graph, class Cost>
   void fill(const Graph& graph, Cost cost) {
     std::vector<Candidate> all;
-    all.reserve(graph.size());
+    all.reserve(2 * graph.size());  // with what is pushed later; address space only, until it is used
     for (std::uint32_t border = 0; border < graph.size(); ++border) {
       if (!graph.isAlive(border)) continue;
       if (const double c = cost(border); std::isfinite(c)) all.push_back({static_cast<float>(c), border});

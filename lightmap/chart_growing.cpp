@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 
 #include "lightmap/border_graph.h"
 #include "lightmap/chart_mesh.h"
@@ -47,12 +48,11 @@ double smallestEigenvalue(const std::array<double, 6>& m) {
 
 class Grower {
  public:
-  Grower(const HalfEdgeMesh& mesh, const GrowOptions& options) : mesh_(mesh), options_(options), borders_(mesh.size()) {}
+  Grower(const HalfEdgeMesh& mesh, const GrowOptions& options) : mesh_(mesh), options_(options), place_(mesh.size(), kSingle), borders_(mesh.size(), 3 * mesh.size() / 2) {}
 
   MergeTree grow() {
     tree_.triangleCount = mesh_.size();
     tree_.merges.reserve(mesh_.size());
-    makeRegions();
     makeBorders();
     const auto costOf = [this](std::uint32_t border) { return cost(border); };
     queue_.fill(borders_, costOf);
@@ -62,6 +62,68 @@ class Grower {
   }
 
  private:
+  /// Where a region's figures are kept. Those of single triangles and of pairs, which is what there is most of, are
+  /// made anew each time: kept, they would take half of the memory of growing. A pair is known by its merge.
+  static constexpr std::uint32_t kSingle = 0xffffffffu;
+  static constexpr std::uint32_t kPair = 0x80000000u;
+
+  bool isKept(std::uint32_t index) const { return place_[index] < kPair; }
+
+  Region regionOf(std::uint32_t index) const {
+    if (isKept(index)) return kept_[place_[index]];
+    if (place_[index] == kSingle) return single(index);
+    const std::uint32_t merge = place_[index] - kPair;
+    const auto [t, u] = tree_.merges[merge];
+    Region pair = united(single(t), single(u), lengthBetween(t, u));
+    pair.node = static_cast<std::uint32_t>(tree_.triangleCount + merge);
+    return pair;
+  }
+
+  static Region united(Region a, const Region& b, float commonLength) {
+    a.perimeter += b.perimeter - 2 * static_cast<double>(commonLength);
+    a.normals = NormalMoments(a.normals, b.normals);
+    a.low = glm::min(a.low, b.low);
+    a.high = glm::max(a.high, b.high);
+    return a;
+  }
+
+  double edgeLength(std::uint32_t triangle, std::size_t k) const {
+    const auto& v = mesh_.triangles[triangle];
+    return glm::length(mesh_.points[v[(k + 1) % 3]] - mesh_.points[v[k]]);
+  }
+
+  /// As the border of two triangles has it.
+  float lengthBetween(std::uint32_t t, std::uint32_t u) const {
+    float length = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      if (mesh_.neighbours[std::min(t, u)][k] == static_cast<std::int32_t>(std::max(t, u)))
+        length += static_cast<float>(edgeLength(std::min(t, u), k));
+    return length;
+  }
+
+  Region single(std::uint32_t triangle) const {
+    Region r;
+    r.normals = NormalMoments(areaNormal(mesh_, triangle));
+    const auto& v = mesh_.triangles[triangle];
+    r.low = Vec3(glm::min(mesh_.points[v[0]], glm::min(mesh_.points[v[1]], mesh_.points[v[2]])));
+    r.high = Vec3(glm::max(mesh_.points[v[0]], glm::max(mesh_.points[v[1]], mesh_.points[v[2]])));
+    for (std::size_t k = 0; k < 3; ++k) r.perimeter += edgeLength(triangle, k);
+    r.node = triangle;
+    return r;
+  }
+
+  void keep(std::uint32_t index, const Region& region) {
+    if (!isKept(index)) {
+      if (free_.empty()) {
+        free_.push_back(static_cast<std::uint32_t>(kept_.size()));
+        kept_.emplace_back();
+      }
+      place_[index] = free_.back();
+      free_.pop_back();
+    }
+    kept_[place_[index]] = region;
+  }
+
   double thinness(std::uint32_t triangle) const {
     const auto& v = mesh_.triangles[triangle];
     double longest2 = 0;
@@ -72,20 +134,6 @@ class Grower {
     return std::min(1.0, glm::length(areaNormal(mesh_, triangle)) / std::sqrt(longest2) / kThinTexels);
   }
 
-  void makeRegions() {
-    regions_.resize(mesh_.size());
-    for (std::uint32_t t = 0; t < mesh_.size(); ++t) {
-      Region& r = regions_[t];
-      r.normals = NormalMoments(areaNormal(mesh_, t));
-      const auto& v = mesh_.triangles[t];
-      r.low = Vec3(glm::min(mesh_.points[v[0]], glm::min(mesh_.points[v[1]], mesh_.points[v[2]])));
-      r.high = Vec3(glm::max(mesh_.points[v[0]], glm::max(mesh_.points[v[1]], mesh_.points[v[2]])));
-      for (std::size_t k = 0; k < 3; ++k)
-        r.perimeter += glm::length(mesh_.points[v[(k + 1) % 3]] - mesh_.points[v[k]]);
-      r.node = t;
-    }
-  }
-
   void makeBorders() {
     for (std::uint32_t t = 0; t < mesh_.size(); ++t) {
       for (std::size_t k = 0; k < 3; ++k) {
@@ -93,9 +141,9 @@ class Grower {
         if (other <= static_cast<std::int32_t>(t)) continue;
         const auto u = static_cast<std::uint32_t>(other);
         Border& border = borders_[borders_.between(t, u)];
-        const double length = glm::length(mesh_.points[mesh_.triangles[t][(k + 1) % 3]] - mesh_.points[mesh_.triangles[t][k]]);
-        const NormalMoments& a = regions_[t].normals;
-        const NormalMoments& b = regions_[u].normals;
+        const double length = edgeLength(t, k);
+        const NormalMoments a(areaNormal(mesh_, t));
+        const NormalMoments b(areaNormal(mesh_, u));
         const double bend = 1 - glm::dot(a.sum, b.sum) / (a.area * b.area);
         const double weight = (mesh_.hard[t][k] ? 1.0 : kSmoothCrease) * std::min(thinness(t), thinness(u));
         border.absorb({static_cast<float>(length), static_cast<float>(length * weight * std::max(0.0, bend))});
@@ -106,8 +154,8 @@ class Grower {
   /// Infinite where the merge is out of the question.
   double cost(std::uint32_t index) const {
     const Border& border = borders_[index];
-    const Region& a = regions_[borders_.ends(index)[0]];
-    const Region& b = regions_[borders_.ends(index)[1]];
+    const Region a = regionOf(borders_.ends(index)[0]);
+    const Region b = regionOf(borders_.ends(index)[1]);
     const Vec3 extent = glm::max(a.high, b.high) - glm::min(a.low, b.low);
     constexpr double kNever = std::numeric_limits<double>::infinity();
     if (static_cast<double>(std::max({extent.x, extent.y, extent.z})) > options_.largestSide) return kNever;
@@ -124,19 +172,24 @@ class Grower {
   }
 
   void merge(std::uint32_t border) {
-    auto [keep, drop] = borders_.ends(border);
-    if (borders_.degree(keep) < borders_.degree(drop)) std::swap(keep, drop);
-    Region& into = regions_[keep];
-    const Region& from = regions_[drop];
-    into.perimeter += from.perimeter - 2 * static_cast<double>(borders_[border].length);
-    into.normals = NormalMoments(into.normals, from.normals);
-    into.low = glm::min(into.low, from.low);
-    into.high = glm::max(into.high, from.high);
+    auto [grown, gone] = borders_.ends(border);
+    if (borders_.degree(grown) < borders_.degree(gone)) std::swap(grown, gone);
+    const bool isPair = place_[grown] == kSingle && place_[gone] == kSingle;
+    const Region from = regionOf(gone);
+    Region into = regionOf(grown);
+    const auto merge = static_cast<std::uint32_t>(tree_.merges.size());
     tree_.merges.push_back({into.node, from.node});
-    into.node = static_cast<std::uint32_t>(tree_.triangleCount + tree_.merges.size() - 1);
-    borders_.merge(drop, keep, [this](std::uint32_t grown) {
+    if (isKept(gone)) free_.push_back(place_[gone]);
+    if (isPair) {
+      place_[grown] = kPair + merge;
+    } else {
+      into = united(into, from, borders_[border].length);
+      into.node = static_cast<std::uint32_t>(tree_.triangleCount + merge);
+      keep(grown, into);
+    }
+    borders_.merge(gone, grown, [this](std::uint32_t longer) {
       // The longer common border may be a better reason to merge than either part was.
-      queue_.push(grown, [this](std::uint32_t b) { return cost(b); });
+      queue_.push(longer, [this](std::uint32_t b) { return cost(b); });
     });
   }
 
@@ -157,7 +210,9 @@ class Grower {
 
   const HalfEdgeMesh& mesh_;
   const GrowOptions& options_;
-  std::vector<Region> regions_;
+  std::vector<std::uint32_t> place_;  // per region: in kept_, or kSingle, or kPair + its merge
+  std::deque<Region> kept_;
+  std::vector<std::uint32_t> free_;  // places in kept_
   BorderGraph<Border> borders_;
   BorderQueue queue_;
   MergeTree tree_;

@@ -32,17 +32,25 @@ std::uint32_t nextCorner(std::uint32_t corner) { return corner % 3 == 2 ? corner
 
 class Builder {
  public:
-  explicit Builder(const TriangleSoup& soup) : soup_(soup), welded_(weldPositions(soup.positions)) {}
+  explicit Builder(TriangleSoup&& soup) : soup_(std::move(soup)), welded_(weldPositions(soup_.positions)) {
+    release(soup_.positions);
+  }
 
   HalfEdgeMesh build() {
     keepTriangles();
     pairSides();
+    release(soup_.normals, soup_.frames, welded_, normals_);
     cutIntoFans();
     fillOpenMesh();
     return std::move(mesh_);
   }
 
  private:
+  template <class... Arrays>
+  static void release(Arrays&... arrays) {
+    ((arrays = Arrays()), ...);
+  }
+
   std::uint32_t vertexAt(std::uint32_t corner) const {
     return soup_.indices[3 * mesh_.sourceTriangle[corner / 3] + corner % 3];
   }
@@ -176,6 +184,7 @@ class Builder {
       mesh_.triangles[corner / 3][corner % 3] = static_cast<std::uint32_t>(vertex);
     }
     mesh_.points.shrink_to_fit();
+    release(soup_.points, soup_.indices, fan_, vertexOfFan);
     std::vector<std::uint32_t> triangleOfFace;
     std::vector<std::uint32_t> misfits;
     for (const std::uint32_t t : sheetOrder()) {
@@ -245,7 +254,7 @@ class Builder {
         }
   }
 
-  const TriangleSoup& soup_;
+  TriangleSoup soup_;
   std::vector<std::uint32_t> welded_;
   std::vector<Vec3> normals_;            // per kept triangle
   std::vector<bool> shadedFromBehind_;   // per kept triangle: all its normals point away from its front
@@ -256,6 +265,6 @@ class Builder {
 
 }  // namespace
 
-HalfEdgeMesh buildHalfEdgeMesh(const TriangleSoup& soup) { return Builder(soup).build(); }
+HalfEdgeMesh buildHalfEdgeMesh(TriangleSoup soup) { return Builder(std::move(soup)).build(); }
 
 }  // namespace lumel

@@ -44,7 +44,7 @@ struct HalfEdgeMesh {
 
 /// Joins triangles along edges of equal position. Where more than two meet, opposite sides are paired, flattest pair
 /// first. Edges where the material's tangent frame breaks (another tangent, handedness, or a frame on one side only)
-/// are not joined.
-HalfEdgeMesh buildHalfEdgeMesh(const TriangleSoup& soup);
+/// are not joined. What of the soup is no longer needed is freed on the way.
+HalfEdgeMesh buildHalfEdgeMesh(TriangleSoup soup);
 
 }  // namespace lumel

@@ -44,7 +44,7 @@ std::vector<std::uint64_t> chartKeys(const Scene& scene, const ObjectLayouts& ob
       for (const UnwrappedChart& chart : layout.unwrapped.charts) {
         std::uint64_t sum = 0;  // whatever the order of triangles
         for (const std::uint32_t t : chart.triangles) {
-          const SourceTriangle& source = layout.source[t];
+          const SourceTriangle source = layout.source[t];
           sum += hashOf(primitives[static_cast<std::size_t>(source.primitive)], source.triangle);
         }
         keys[u].push_back(mixed(mixed(name, chart.triangles.size()), sum));

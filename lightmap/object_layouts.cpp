@@ -57,7 +57,7 @@ Vec3 unitOr(const Vec3& v, const Vec3& otherwise) {
 
 }  // namespace
 
-TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texelsPerMeter, std::vector<SourceTriangle>& source) {
+TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texelsPerMeter, TriangleSources& source) {
   TriangleSoup soup;
   const Mat3d linear = Mat3d(Mat3(instance.worldFromObject)) * densityOf(instance, texelsPerMeter);
   const bool mirrors = glm::determinant(linear) < 0;
@@ -74,11 +74,10 @@ TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texel
     if (hasMaterialFrame(primitive))  // as they will be baked: at right angles to the normal
       for (std::size_t i = 0; i < primitive.positions.size(); ++i)
         soup.frames[base + i] = Vec4(frameFromTangent(primitive.normals[i], primitive.tangents[i]).t, primitive.tangents[i].w < 0 ? -1.0f : 1.0f);
-    for (std::uint32_t t = 0; t < primitive.triangleCount(); ++t) {
-      source.push_back({static_cast<int>(p), t});
+    source.add(static_cast<int>(p), primitive.triangleCount());
+    for (std::uint32_t t = 0; t < primitive.triangleCount(); ++t)
       for (const std::uint32_t k : {0u, mirrors ? 2u : 1u, mirrors ? 1u : 2u})
         soup.indices.push_back(base + primitive.indices[3 * t + k]);
-    }
   }
   return soup;
 }

@@ -2,6 +2,7 @@
 // flattening, each has its own place later.
 #pragma once
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -16,9 +17,28 @@ struct SourceTriangle {
   std::uint32_t triangle = 0;
 };
 
+/// Where the triangles of a soup come from: primitives follow each other whole.
+class TriangleSources {
+ public:
+  void add(int primitive, std::size_t triangles) {
+    primitives_.push_back({primitive, static_cast<std::uint32_t>(count_)});
+    count_ += triangles;
+  }
+  std::size_t size() const { return count_; }
+  SourceTriangle operator[](std::uint32_t triangle) const {
+    const auto after = std::upper_bound(primitives_.begin(), primitives_.end(), triangle,
+                                        [](std::uint32_t t, const SourceTriangle& p) { return t < p.triangle; });
+    return {(after - 1)->primitive, triangle - (after - 1)->triangle};
+  }
+
+ private:
+  std::vector<SourceTriangle> primitives_;  // with the first of the soup's triangles that is theirs
+  std::size_t count_ = 0;
+};
+
 struct ObjectLayout {
   Unwrapped unwrapped;
-  std::vector<SourceTriangle> source;  // per triangle of the soup that was unwrapped
+  TriangleSources source;  // of the soup that was unwrapped
 };
 
 struct LayoutUse {
@@ -33,7 +53,7 @@ struct ObjectLayouts {
 };
 
 /// The instance's triangles that get a lightmap, in texels, counter-clockwise from the front in the world.
-TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texelsPerMeter, std::vector<SourceTriangle>& source);
+TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texelsPerMeter, TriangleSources& source);
 
 /// Surface of the instance in square metres, times the square of its density scale: what it asks of the atlas.
 double weightedArea(const Scene& scene, const Instance& instance);

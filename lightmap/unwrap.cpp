@@ -129,8 +129,7 @@ class Unwrapper {
 }  // namespace
 
 Unwrapped unwrap(TriangleSoup&& soup, const UnwrapOptions& options) {
-  const HalfEdgeMesh mesh = buildHalfEdgeMesh(soup);
-  soup = {};
+  const HalfEdgeMesh mesh = buildHalfEdgeMesh(std::move(soup));
   GrowOptions growOptions;
   growOptions.largestSide = options.largestSide;
   const MergeTree tree = growCharts(mesh, growOptions);
