@@ -142,9 +142,9 @@ class Grower {
         const auto u = static_cast<std::uint32_t>(other);
         Border& border = borders_[borders_.between(t, u)];
         const double length = edgeLength(t, k);
-        const NormalMoments a(areaNormal(mesh_, t));
-        const NormalMoments b(areaNormal(mesh_, u));
-        const double bend = 1 - glm::dot(a.sum, b.sum) / (a.area * b.area);
+        const Vec3d a = areaNormal(mesh_, t);
+        const Vec3d b = areaNormal(mesh_, u);
+        const double bend = 1 - glm::dot(a, b) / (glm::length(a) * glm::length(b));
         const double weight = (mesh_.hard[t][k] ? 1.0 : kSmoothCrease) * std::min(thinness(t), thinness(u));
         border.absorb({static_cast<float>(length), static_cast<float>(length * weight * std::max(0.0, bend))});
       }

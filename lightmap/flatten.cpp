@@ -141,13 +141,14 @@ class RigidRelaxation {
 
   /// One iteration; returns how far points moved, root mean square, or a negative number if the solve failed.
   double step(std::vector<Vec2d>& uvs) const {
-    std::vector<Vec2d> move(uvs.size(), Vec2d(0.0));
+    std::vector<Vec2d> move(uvs.size(), Vec2d(0.0));  // by rank
     for (std::size_t t = 0; t < chart_.triangles.size(); ++t) addTriangle(t, uvs, move);
     solver_.solve(move);
     double moved = 0;
     for (std::size_t i = 0; i < uvs.size(); ++i) {
-      moved += glm::dot(move[i], move[i]);
-      uvs[i] += move[i];
+      const Vec2d by = move[solver_.rankOf(i)];
+      moved += glm::dot(by, by);
+      uvs[i] += by;
     }
     return std::isfinite(moved) ? std::sqrt(moved / static_cast<double>(uvs.size())) : -1.0;
   }
@@ -202,8 +203,8 @@ class RigidRelaxation {
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec2d turned(cosine * e[k].x - sine * e[k].y, sine * e[k].x + cosine * e[k].y);
       const Vec2d missing = weight[k] * (turned - (uvs[v[(k + 1) % 3]] - uvs[v[k]]));
-      right[v[k]] -= missing;
-      right[v[(k + 1) % 3]] += missing;
+      right[solver_.rankOf(v[k])] -= missing;
+      right[solver_.rankOf(v[(k + 1) % 3])] += missing;
     }
   }
 

@@ -51,8 +51,9 @@ class Builder {
     ((arrays = Arrays()), ...);
   }
 
+  /// Corners are those of kept triangles.
   std::uint32_t vertexAt(std::uint32_t corner) const {
-    return soup_.indices[3 * mesh_.sourceTriangle[corner / 3] + corner % 3];
+    return soup_.indices[corner];
   }
   std::uint32_t pointAt(std::uint32_t corner) const { return welded_[vertexAt(corner)]; }
 
@@ -66,15 +67,16 @@ class Builder {
       const double longest2 = std::max({glm::dot(b - a, b - a), glm::dot(c - b, c - b), glm::dot(a - c, a - c)});
       const double area = 0.5 * glm::length(areaNormal);
       if (!(area > kDegenerateArea * longest2)) {
-        ++mesh_.degenerateTriangles;
+        mesh_.leftOut.push_back(t);
         continue;
       }
-      mesh_.sourceTriangle.push_back(t);
       normals_.push_back(Vec3(areaNormal / (2 * area)));
       bool back = true;
       for (std::size_t k = 0; k < 3; ++k) back = back && glm::dot(soup_.normals[v[k]], normals_.back()) < 0;
       shadedFromBehind_.push_back(back);
+      std::copy_n(v, 3, &soup_.indices[3 * (normals_.size() - 1)]);
     }
+    soup_.indices.resize(3 * normals_.size());
   }
 
   /// Whether a chart may run across the edge, as the material's frame has it; and whether it is shaded hard.
@@ -108,7 +110,7 @@ class Builder {
   }
 
   void pairSides() {
-    const std::uint32_t corners = static_cast<std::uint32_t>(3 * mesh_.sourceTriangle.size());
+    const std::uint32_t corners = static_cast<std::uint32_t>(soup_.indices.size());
     std::vector<Side> sides(corners);
     for (std::uint32_t corner = 0; corner < corners; ++corner) {
       const std::uint32_t a = pointAt(corner);
@@ -170,7 +172,7 @@ class Builder {
     // A face that does not fit is told by add_face's result; OpenMesh would also print it.
     [[maybe_unused]] static const bool quiet = (omerr().disable(), true);
     OpenMeshMesh mesh;
-    const std::size_t count = mesh_.sourceTriangle.size();
+    const std::size_t count = opposite_.size() / 3;
     const auto borders = static_cast<std::size_t>(std::count(opposite_.begin(), opposite_.end(), -1));
     mesh.reserve(count / 2 + borders + 3, (3 * count + borders) / 2 + 3, count);
     std::vector<int> vertexOfFan(fan_.size(), -1);
@@ -202,7 +204,7 @@ class Builder {
   /// as they come, and cannot always join patches that began apart.
   std::vector<std::uint32_t> sheetOrder() const {
     std::vector<std::uint32_t> order;
-    std::vector<bool> seen(mesh_.sourceTriangle.size(), false);
+    std::vector<bool> seen(opposite_.size() / 3, false);
     for (std::uint32_t start = 0; start < seen.size(); ++start) {
       if (seen[start]) continue;
       seen[start] = true;
@@ -264,6 +266,16 @@ class Builder {
 };
 
 }  // namespace
+
+std::uint32_t HalfEdgeMesh::sourceOf(std::uint32_t triangle) const {
+  // leftOut[i] - i kept triangles come before the one left out.
+  std::size_t low = 0, high = leftOut.size();
+  while (low < high) {
+    const std::size_t middle = (low + high) / 2;
+    (leftOut[middle] - middle <= triangle ? low = middle + 1 : high = middle);
+  }
+  return triangle + static_cast<std::uint32_t>(low);
+}
 
 HalfEdgeMesh buildHalfEdgeMesh(TriangleSoup soup) { return Builder(std::move(soup)).build(); }
 

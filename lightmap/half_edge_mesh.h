@@ -27,19 +27,21 @@ struct FrameBreak {
   std::uint32_t cornerB = 0;
 };
 
-/// The repaired mesh. Triangles of the soup without area are left out and counted; every other one is in.
+/// The repaired mesh. Triangles of the soup without area (less than 1e-12 of the longest edge's square) are left out;
+/// every other one is in, in the soup's order.
 struct HalfEdgeMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;  // into `points`
   std::vector<std::array<std::int32_t, 3>> neighbours;  // triangle beyond edge (k, k + 1); -1 where none may be joined
   std::vector<std::array<bool, 3>> hard;                // edge (k, k + 1): the shading normals of its sides differ
   std::vector<Vec3d> points;                            // texels
-  std::vector<std::uint32_t> sourceTriangle;            // into the soup
+  std::vector<std::uint32_t> leftOut;                   // triangles of the soup without area, ascending
   std::vector<FrameBreak> frameBreaks;
-  std::size_t degenerateTriangles = 0;                  // no area: less than 1e-12 of the longest edge's square
   std::size_t nonManifoldEdges = 0;                     // more than two sides, or two of contrary winding
   std::size_t selfMeetingTriangles = 0;                 // of sheets that meet themselves at both ends of an edge
 
   std::size_t size() const { return triangles.size(); }
+  /// A triangle's number in the soup.
+  std::uint32_t sourceOf(std::uint32_t triangle) const;
 };
 
 /// Joins triangles along edges of equal position. Where more than two meet, opposite sides are paired, flattest pair

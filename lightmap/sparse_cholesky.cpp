@@ -2,6 +2,8 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <atomic>
+#include <cmath>
 
 #include "scene/parallel.h"
 
@@ -9,6 +11,8 @@ namespace lumel {
 namespace {
 
 constexpr std::uint32_t kTaskPoints = 4000;  // subtrees of about as many points are tasks
+constexpr std::size_t kTasksAtOnce = 32;
+constexpr double kMostSteps = 32767.0;
 
 }  // namespace
 
@@ -17,7 +21,8 @@ struct SparseCholesky::Workspace {
   std::vector<std::uint32_t> place;
 };
 
-SparseCholesky::SparseCholesky(std::span<const Vec3d> points, std::span<const std::array<std::uint32_t, 3>> triangles) : rank_(points.size()) {
+SparseCholesky::SparseCholesky(std::span<const Vec3d> points, std::span<const std::array<std::uint32_t, 3>> triangles)
+    : triangles_(triangles), order_(triangles.size()), rank_(points.size()), step_(points.size()) {
   const Dissection dissection = nestedDissection(points, triangles);
   for (std::uint32_t i = 0; i < dissection.order.size(); ++i) rank_[dissection.order[i]] = i;
   std::vector<std::uint32_t> frontOf(points.size());
@@ -33,25 +38,27 @@ SparseCholesky::SparseCholesky(std::span<const Vec3d> points, std::span<const st
     fronts_.push_back(front);
   }
   // A triangle goes to the front that eliminates the first of its points; the other two are then in that front as well.
-  const auto frontOfTriangle = [&](const std::array<std::uint32_t, 3>& t) {
-    return frontOf[std::min({rank_[t[0]], rank_[t[1]], rank_[t[2]]})];
+  const auto frontOfTriangle = [&](std::uint32_t t) {
+    const std::array<std::uint32_t, 3> ranks = ranksOf(t);
+    return frontOf[std::min({ranks[0], ranks[1], ranks[2]})];
   };
-  for (const auto& t : triangles) ++fronts_[frontOfTriangle(t)].triangles;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) ++fronts_[frontOfTriangle(t)].triangles;
   std::uint32_t next = 0;
   for (Front& front : fronts_) {
     front.firstTriangle = next;
     next += front.triangles;
     front.triangles = 0;
   }
-  ranks_.resize(triangles.size());
-  triangle_.resize(triangles.size());
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-    Front& front = fronts_[frontOfTriangle(triangles[t])];
-    const std::uint32_t place = front.firstTriangle + front.triangles++;
-    triangle_[place] = t;
-    for (std::size_t k = 0; k < 3; ++k) ranks_[place][k] = rank_[triangles[t][k]];
+    Front& front = fronts_[frontOfTriangle(t)];
+    order_[front.firstTriangle + front.triangles++] = t;
   }
   analyse();
+}
+
+std::array<std::uint32_t, 3> SparseCholesky::ranksOf(std::uint32_t triangle) const {
+  const auto& t = triangles_[triangle];
+  return {rank_[t[0]], rank_[t[1]], rank_[t[2]]};
 }
 
 /// The rows of every front: what its triangles and its children reach beyond it.
@@ -64,7 +71,7 @@ void SparseCholesky::analyse() {
       if (rank >= front.end) reached.push_back(rank);
     };
     for (std::uint32_t i = front.firstTriangle; i < front.firstTriangle + front.triangles; ++i)
-      for (const std::uint32_t rank : ranks_[i]) reach(rank);
+      for (const std::uint32_t rank : ranksOf(order_[i])) reach(rank);
     for (const std::int32_t child : {front.left, front.right}) {
       if (child < 0) continue;
       const Front& below = fronts_[static_cast<std::size_t>(child)];
@@ -80,7 +87,7 @@ void SparseCholesky::analyse() {
     values += pivots * (pivots + front.rows) - pivots * (pivots - 1) / 2;
   }
   rows_.shrink_to_fit();
-  values_.resize(values);
+  values_ = std::make_unique_for_overwrite<std::int16_t[]>(values);
 }
 
 std::uint32_t SparseCholesky::localRow(const Front& front, std::uint32_t rank) const {
@@ -95,12 +102,14 @@ bool SparseCholesky::eliminate(std::uint32_t index, const std::function<std::arr
   const auto pivots = static_cast<Eigen::Index>(front.end - front.begin);
   const auto below = static_cast<Eigen::Index>(front.rows);
   const Eigen::Index size = pivots + below;
-  work.front.assign(static_cast<std::size_t>(size * size), 0.0);
+  const auto entries = static_cast<std::size_t>(size * size);
+  if (work.front.capacity() < entries) work.front = std::vector<double>();  // or both would be there for a moment
+  work.front.assign(entries, 0.0);
   Eigen::Map<Eigen::MatrixXd> matrix(work.front.data(), size, size);  // its lower triangle
   for (std::uint32_t i = front.firstTriangle; i < front.firstTriangle + front.triangles; ++i) {
-    const std::array<double, 3> w = weights(triangle_[i]);
-    std::array<std::uint32_t, 3> row;
-    for (std::size_t k = 0; k < 3; ++k) row[k] = localRow(front, ranks_[i][k]);
+    const std::array<double, 3> w = weights(order_[i]);
+    std::array<std::uint32_t, 3> row = ranksOf(order_[i]);
+    for (std::uint32_t& r : row) r = localRow(front, r);
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t a = row[k], b = row[(k + 1) % 3];
       matrix(a, a) += w[k];
@@ -115,8 +124,9 @@ bool SparseCholesky::eliminate(std::uint32_t index, const std::function<std::arr
     std::vector<double>& update = updates[static_cast<std::size_t>(child)];
     work.place.clear();
     for (std::uint32_t i = 0; i < from.rows; ++i) work.place.push_back(localRow(front, rows_[from.firstRow + i]));
+    const double* value = update.data();
     for (std::size_t j = 0; j < from.rows; ++j)
-      for (std::size_t i = j; i < from.rows; ++i) matrix(work.place[i], work.place[j]) += update[j * from.rows + i];
+      for (std::size_t i = j; i < from.rows; ++i) matrix(work.place[i], work.place[j]) += *value++;
     update = std::vector<double>();  // gives its memory back
   }
   if (pivots > 0) {
@@ -127,51 +137,74 @@ bool SparseCholesky::eliminate(std::uint32_t index, const std::function<std::arr
     auto rest = matrix.bottomRightCorner(below, below);
     corner.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(side);
     rest.selfadjointView<Eigen::Lower>().rankUpdate(side, -1.0);
-    float* value = values_.data() + front.values;
-    for (Eigen::Index j = 0; j < pivots; ++j)
-      for (Eigen::Index i = j; i < size; ++i) *value++ = static_cast<float>(matrix(i, j));
+    store(front, matrix.data());
   }
-  updates[index].resize(static_cast<std::size_t>(below * below));
-  Eigen::Map<Eigen::MatrixXd>(updates[index].data(), below, below) = matrix.bottomRightCorner(below, below);
+  updates[index].reserve(front.rows * (front.rows + std::size_t{1}) / 2);
+  for (Eigen::Index j = pivots; j < size; ++j) updates[index].insert(updates[index].end(), &matrix(j, j), &matrix(0, j) + size);
   return true;
+}
+
+/// `matrix`: by columns; those of the front's points are done.
+void SparseCholesky::store(const Front& front, const double* matrix) {
+  const std::size_t pivots = front.end - front.begin;
+  const std::size_t size = pivots + front.rows;
+  std::int16_t* value = values_.get() + front.values;
+  for (std::size_t j = 0; j < pivots; ++j) {
+    const double* column = matrix + j * size;
+    double largest = 0;
+    for (std::size_t i = j; i < size; ++i) largest = std::max(largest, std::abs(column[i]));
+    const float step = static_cast<float>(largest / kMostSteps);
+    step_[front.begin + j] = step;
+    const double perStep = 1 / static_cast<double>(step);
+    for (std::size_t i = j; i < size; ++i)
+      *value++ = static_cast<std::int16_t>(column[i] * perStep + std::copysign(0.5, column[i]));  // to the nearest
+  }
 }
 
 bool SparseCholesky::factorize(const std::function<std::array<double, 3>(std::size_t)>& weights) {
   std::vector<std::vector<double>> updates(fronts_.size());
-  // Subtrees small enough are independent tasks; what joins them comes after.
-  std::vector<std::uint32_t> tasks, joints;
-  for (std::uint32_t i = static_cast<std::uint32_t>(fronts_.size()); i-- > 0;) {
-    const std::uint32_t first = i + 1 - fronts_[i].subtree;
-    if (fronts_[i].end - fronts_[first].begin <= kTaskPoints) {
-      tasks.push_back(i);
-      i = first;
-    } else {
-      joints.push_back(i);
-    }
+  std::atomic<bool> failed = false;
+  const auto run = [&](std::uint32_t first, std::uint32_t last, Workspace& work) {
+    for (std::uint32_t i = first; i <= last && !failed; ++i)
+      if (!eliminate(i, weights, work, updates)) failed = true;
+  };
+  // Subtrees small enough are independent tasks. What joins some of them comes right after these, before what they pass
+  // on is more than all that is kept.
+  const auto isTask = [&](std::uint32_t i) { return fronts_[i].end - fronts_[i + 1 - fronts_[i].subtree].begin <= kTaskPoints; };
+  std::vector<std::uint32_t> parts, tasks, joints;
+  for (auto i = static_cast<std::uint32_t>(fronts_.size()); i-- > 0;) {
+    parts.push_back(i);
+    if (isTask(i)) i -= fronts_[i].subtree - 1;
   }
-  std::reverse(joints.begin(), joints.end());
-  std::vector<std::uint8_t> failed(tasks.size(), 0);
-  parallelFor(tasks.size(), 1, [&](std::size_t from, std::size_t to) {
-    Workspace work;
-    for (std::size_t task = from; task < to; ++task)
-      for (std::uint32_t i = tasks[task] + 1 - fronts_[tasks[task]].subtree; i <= tasks[task] && !failed[task]; ++i)
-        failed[task] = !eliminate(i, weights, work, updates);
-  });
-  Workspace work;
-  return std::find(failed.begin(), failed.end(), 1) == failed.end() &&
-         std::all_of(joints.begin(), joints.end(), [&](std::uint32_t i) { return eliminate(i, weights, work, updates); });
+  std::reverse(parts.begin(), parts.end());
+  Workspace joining;
+  const auto flush = [&] {
+    parallelFor(tasks.size(), 1, [&](std::size_t from, std::size_t to) {
+      Workspace work;
+      for (std::size_t t = from; t < to; ++t) run(tasks[t] + 1 - fronts_[tasks[t]].subtree, tasks[t], work);
+    });
+    for (const std::uint32_t joint : joints) run(joint, joint, joining);
+    tasks.clear();
+    joints.clear();
+  };
+  for (const std::uint32_t part : parts) {
+    if (isTask(part) && tasks.size() == kTasksAtOnce) flush();
+    (isTask(part) ? tasks : joints).push_back(part);
+  }
+  flush();
+  return !failed;
 }
 
-void SparseCholesky::solve(std::vector<Vec2d>& values) const {
-  std::vector<Vec2d> x(values.size());
-  for (std::size_t i = 0; i < x.size(); ++i) x[rank_[i]] = values[i];
+void SparseCholesky::solve(std::span<Vec2d> x) const {
   for (const Front& front : fronts_) {
-    const float* column = values_.data() + front.values;
+    const std::int16_t* column = values_.get() + front.values;
     const std::uint32_t* rows = rows_.data() + front.firstRow;
     for (std::uint32_t j = front.begin; j < front.end; ++j) {
-      x[j] /= static_cast<double>(*column++);
-      for (std::uint32_t i = j + 1; i < front.end; ++i) x[i] -= static_cast<double>(*column++) * x[j];
-      for (std::uint32_t i = 0; i < front.rows; ++i) x[rows[i]] -= static_cast<double>(*column++) * x[j];
+      const double step = static_cast<double>(step_[j]);
+      x[j] /= step * *column++;
+      const Vec2d times = step * x[j];
+      for (std::uint32_t i = j + 1; i < front.end; ++i) x[i] -= static_cast<double>(*column++) * times;
+      for (std::uint32_t i = 0; i < front.rows; ++i) x[rows[i]] -= static_cast<double>(*column++) * times;
     }
   }
   for (std::size_t f = fronts_.size(); f-- > 0;) {
@@ -180,15 +213,15 @@ void SparseCholesky::solve(std::vector<Vec2d>& values) const {
     for (std::uint32_t j = front.end; j-- > front.begin;) {
       const std::size_t pivot = j - front.begin;
       const std::size_t length = front.end - front.begin + front.rows;
-      const float* column = values_.data() + front.values + pivot * length - pivot * (pivot - 1) / 2;
-      Vec2d sum = x[j];
-      const double diagonal = static_cast<double>(*column++);
+      const std::int16_t* column = values_.get() + front.values + pivot * length - pivot * (pivot - 1) / 2;
+      const double step = static_cast<double>(step_[j]);
+      const double diagonal = *column++;
+      Vec2d sum = x[j] / step;
       for (std::uint32_t i = j + 1; i < front.end; ++i) sum -= static_cast<double>(*column++) * x[i];
       for (std::uint32_t i = 0; i < front.rows; ++i) sum -= static_cast<double>(*column++) * x[rows[i]];
       x[j] = sum / diagonal;
     }
   }
-  for (std::size_t i = 0; i < x.size(); ++i) values[i] = x[rank_[i]];
 }
 
 }  // namespace lumel

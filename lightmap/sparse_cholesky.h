@@ -4,24 +4,29 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 
 #include "lightmap/nested_dissection.h"
 
 namespace lumel {
 
 /// L L^T of the matrix sum over triangle sides (i, j) of w (e_i - e_j)(e_i - e_j)^T, with one point held by a weight of 1.
-/// The factor is kept in floats, packed: 4 bytes per entry. So a solution is good to about five digits; who wants more
-/// solves for what is still missing.
+/// The factor is kept in 16 bits an entry, in steps of each column's own. So a solution is good to two
+/// or three digits; who wants more solves for what is still missing.
 class SparseCholesky {
  public:
+  /// The triangles must outlive it.
   SparseCholesky(std::span<const Vec3d> points, std::span<const std::array<std::uint32_t, 3>> triangles);
 
   /// `weights(t)`: of triangle t's sides (k, k + 1); parallel over parts of the mesh, the same for any thread count.
   /// False: the matrix is not positive definite (the triangles do not hang together).
   bool factorize(const std::function<std::array<double, 3>(std::size_t)>& weights);
 
-  /// `values`: per point, the right side, replaced by the solution.
-  void solve(std::vector<Vec2d>& values) const;
+  /// A point's place in the order of elimination.
+  std::uint32_t rankOf(std::size_t point) const { return rank_[point]; }
+
+  /// `x`: the right side by rank, replaced by the solution.
+  void solve(std::span<Vec2d> x) const;
 
  private:
   struct Front {  // a node of the dissection: its points are eliminated at once
@@ -37,14 +42,17 @@ class SparseCholesky {
   void analyse();
   bool eliminate(std::uint32_t front, const std::function<std::array<double, 3>(std::size_t)>& weights, Workspace& work,
                  std::vector<std::vector<double>>& updates);
+  std::array<std::uint32_t, 3> ranksOf(std::uint32_t triangle) const;
+  void store(const Front& front, const double* matrix);
   std::uint32_t localRow(const Front& front, std::uint32_t rank) const;
 
-  std::vector<std::array<std::uint32_t, 3>> ranks_;  // per triangle, in the order of fronts
-  std::vector<std::uint32_t> triangle_;              // its number
-  std::vector<std::uint32_t> rank_;                  // per point
-  std::vector<Front> fronts_;                        // children before parents
+  std::span<const std::array<std::uint32_t, 3>> triangles_;
+  std::vector<std::uint32_t> order_;  // of triangles, by fronts
+  std::vector<std::uint32_t> rank_;   // per point
+  std::vector<Front> fronts_;         // children before parents
   std::vector<std::uint32_t> rows_;
-  std::vector<float> values_;
+  std::vector<float> step_;           // per rank, of its column
+  std::unique_ptr<std::int16_t[]> values_;
 };
 
 }  // namespace lumel

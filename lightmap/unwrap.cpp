@@ -63,7 +63,7 @@ UnwrappedChart finish(const HalfEdgeMesh& mesh, FlatChart& flat, double largestS
   const Vec2d low = boxOf(aligned).low;
   UnwrappedChart chart;
   for (const Vec2d uv : aligned) chart.uvs.push_back(Vec2(uv - low));
-  for (const std::uint32_t t : flat.mesh.meshTriangles) chart.triangles.push_back(mesh.sourceTriangle[t]);
+  for (const std::uint32_t t : flat.mesh.meshTriangles) chart.triangles.push_back(mesh.sourceOf(t));
   chart.corners = std::move(flat.mesh.triangles);
   return chart;
 }
@@ -147,7 +147,7 @@ Unwrapped unwrap(TriangleSoup&& soup, const UnwrapOptions& options) {
   charts = splitAtFrameSlits(mesh, std::move(charts), kSmallFrameGap);
 
   Unwrapped result;
-  result.degenerateTriangles = mesh.degenerateTriangles;
+  result.degenerateTriangles = mesh.leftOut.size();
   result.nonManifoldEdges = mesh.nonManifoldEdges;
   result.charts.resize(charts.size());
   std::vector<std::uint8_t> tooLarge(charts.size(), 0);
