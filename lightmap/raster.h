@@ -15,7 +15,8 @@ namespace lumel {
 inline constexpr double kTexelSnap = 1.0 / 1024;
 
 inline double snapToTexelBorder(double x) {
-  const double nearest = std::round(x);
+  constexpr double kNoFraction = 6755399441055744.0;  // 1.5 * 2^52: so large that sums are whole; std::round would be a call
+  const double nearest = (x + kNoFraction) - kNoFraction;
   return std::abs(x - nearest) <= kTexelSnap ? nearest : x;
 }
 
@@ -39,30 +40,53 @@ void forEachTexelSpan(const std::array<Vec2d, 3>& p, const TexelWindow& window, 
   if (!(std::abs(twiceArea) > 0) || !std::isfinite(twiceArea)) return;
   const auto [minX, maxX] = std::minmax({p[0].x, p[1].x, p[2].x});
   const auto [minY, maxY] = std::minmax({p[0].y, p[1].y, p[2].y});
-  const auto inWindow = [](double value, int low, int high) {
-    return static_cast<int>(std::clamp(value, static_cast<double>(low), static_cast<double>(high)));
+  const auto floorIn = [](double value, int low, int high) {
+    const double inside = std::clamp(value, static_cast<double>(low), static_cast<double>(high));
+    const int whole = static_cast<int>(inside);
+    return whole - (inside < whole);
   };
-  const int lastRow = inWindow(std::ceil(maxY), window.y0, window.y1);
-  for (int y = inWindow(std::floor(minY), window.y0, window.y1); y < lastRow; ++y) {
-    double left = maxX;
-    double right = minX;
-    const auto extend = [&left, &right](double x) {
+  const auto ceilIn = [](double value, int low, int high) {
+    const double inside = std::clamp(value, static_cast<double>(low), static_cast<double>(high));
+    const int whole = static_cast<int>(inside);
+    return whole + (inside > whole);
+  };
+  const auto emit = [&](int y, double left, double right) {
+    const int first = floorIn(left, window.x0, window.x1);
+    const int last = ceilIn(right, window.x0, window.x1);
+    if (first < last) span(y, first, last);
+  };
+  const int firstRow = floorIn(minY, window.y0, window.y1);
+  const int lastRow = ceilIn(maxY, window.y0, window.y1);
+  if (firstRow <= minY && maxY <= firstRow + 1) {  // most triangles are smaller than a texel
+    if (firstRow < lastRow) emit(firstRow, minX, maxX);
+    return;
+  }
+  struct Range {
+    double left, right;
+    void extend(double x) {
       left = std::min(left, x);
       right = std::max(right, x);
-    };
+    }
+  };
+  const auto crossing = [&](double border) {
+    Range range{maxX, minX};
     for (std::size_t i = 0; i < 3; ++i) {
       const Vec2d& a = p[i];
       const Vec2d& b = p[(i + 1) % 3];
-      if (a.y >= y && a.y <= y + 1) extend(a.x);
-      for (const double border : {static_cast<double>(y), static_cast<double>(y + 1)})
-        if ((a.y < border) != (b.y < border)) extend(a.x + (b.x - a.x) * ((border - a.y) / (b.y - a.y)));
+      if ((a.y < border) != (b.y < border)) range.extend(a.x + (b.x - a.x) * ((border - a.y) / (b.y - a.y)));
     }
-    left = std::max(minX, left - margin);
-    right = std::min(maxX, right + margin);
-    if (!(left < right)) continue;
-    const int first = inWindow(std::floor(left), window.x0, window.x1);
-    const int last = inWindow(std::ceil(right), window.x0, window.x1);
-    if (first < last) span(y, first, last);
+    return range;
+  };
+  Range above = crossing(firstRow);
+  for (int y = firstRow; y < lastRow; ++y) {
+    const Range below = crossing(y + 1);
+    Range range{std::min(above.left, below.left), std::max(above.right, below.right)};
+    for (const Vec2d& a : p)
+      if (a.y >= y && a.y <= y + 1) range.extend(a.x);
+    above = below;
+    const double left = std::max(minX, range.left - margin);
+    const double right = std::min(maxX, range.right + margin);
+    if (left < right) emit(y, left, right);
   }
 }
 
