@@ -75,9 +75,10 @@ void rasterise(const PackShape& source, GridShape& shape) {
   const bool isBox = shape.texels.count() == static_cast<std::size_t>(shape.size.x * shape.size.y);
   if (isBox || shape.size.x * shape.size.y > kMostTexelsToShift) return;
   std::size_t fewest = shape.texels.count();
+  const auto isSame = [](double share, double room) { return share != 0.5 && room <= kTexelSnap; };
   for (const double shareY : {0.0, 0.5, 1.0})
     for (const double shareX : {0.0, 0.5, 1.0}) {
-      if (shareX == 0.5 && shareY == 0.5) continue;  // known
+      if (isSame(shareX, slack.x) || isSame(shareY, slack.y) || (shareX == 0.5 && shareY == 0.5)) continue;
       const Vec2d offset = Vec2d(shareX, shareY) * slack - box.low;
       Bitmap texels = touchedTexels(source, offset, shape.size);
       const std::size_t count = texels.count();

@@ -70,6 +70,7 @@ void forEachTexelSpan(const std::array<Vec2d, 3>& p, const TexelWindow& window, 
   };
   const auto crossing = [&](double border) {
     Range range{maxX, minX};
+    if (border <= minY || border > maxY) return range;
     for (std::size_t i = 0; i < 3; ++i) {
       const Vec2d& a = p[i];
       const Vec2d& b = p[(i + 1) % 3];
