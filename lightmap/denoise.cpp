@@ -249,6 +249,37 @@ void storeTile(const Tile& tile, std::size_t row, std::size_t column, std::size_
     }
 }
 
+float luminanceAt(const Image& map, std::size_t texel) {
+  const float* pixel = map.pixels.data() + 3 * texel;
+  return luminance(Vec3(pixel[0], pixel[1], pixel[2]));
+}
+
+/// Per chart id, the light of its texels.
+std::vector<double> lightOfCharts(const Image& flat, std::span<const std::uint32_t> chartIds) {
+  std::vector<double> light(std::size_t{1} + *std::max_element(chartIds.begin(), chartIds.end()), 0.0);
+  for (std::size_t i = 0; i < chartIds.size(); ++i) light[chartIds[i]] += static_cast<double>(luminanceAt(flat, i));
+  return light;
+}
+
+/// Gives every chart back the light that averaging took where it curves; texels share it by their noise.
+void restoreLight(const std::array<Image*, kMaps>& maps, const Judged& judged, const std::vector<double>& before) {
+  std::vector<double> missing = lightOfCharts(*maps[0], judged.chartIds);
+  for (std::size_t c = 0; c < before.size(); ++c) missing[c] = before[c] - missing[c];
+  const auto errorOf = [&](std::size_t texel) { return static_cast<double>(judged.errors[texel * judged.stride]); };
+  std::vector<double> noise(before.size(), 0.0);
+  for (std::size_t i = 0; i < judged.chartIds.size(); ++i) noise[judged.chartIds[i]] += errorOf(i);
+  parallelFor(judged.chartIds.size(), kTileRows * kTileColumns, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      const std::uint32_t chart = judged.chartIds[i];
+      if (chart == 0) continue;
+      const double gain = missing[chart] * errorOf(i) / (noise[chart] * static_cast<double>(luminanceAt(*maps[0], i)));
+      if (!std::isfinite(gain)) continue;  // a chart without noise, or with what is not a number; a black texel
+      for (Image* map : maps)
+        for (std::size_t c = 0; c < 3; ++c) map->pixels[3 * i + c] *= static_cast<float>(1.0 + gain);
+    }
+  });
+}
+
 }  // namespace
 
 void denoise(Image& flat, std::array<Image, 3>& rnm, std::span<const std::uint32_t> chartIds,
@@ -259,7 +290,9 @@ void denoise(Image& flat, std::array<Image, 3>& rnm, std::span<const std::uint32
   Rows before{{&flat, &rnm[0], &rnm[1], &rnm[2]}, {}};
   for (const Image* map : before.maps)
     LUMEL_CHECK(map->width == flat.width && map->height == flat.height && map->channels == 3);
+  if (chartIds.empty()) return;
   const Judged judged{chartIds, standardError, stride};
+  const std::vector<double> light = lightOfCharts(flat, chartIds);
   const std::size_t tilesPerRow = (width + kTileColumns - 1) / kTileColumns;
   std::array<std::vector<float>, kMaps> strip;
   for (std::size_t first = 0; first < height; first += kStripRows) {
@@ -283,6 +316,7 @@ void denoise(Image& flat, std::array<Image, 3>& rnm, std::span<const std::uint32
       std::copy(strip[m].begin(), strip[m].end(),
                 before.maps[m]->pixels.begin() + static_cast<std::ptrdiff_t>(first * width * 3));
   }
+  restoreLight(before.maps, judged, light);
 }
 
 }  // namespace lumel

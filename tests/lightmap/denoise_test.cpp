@@ -73,6 +73,30 @@ TEST(Denoise, ASlopeIsNotBentAtTheBordersOfAChart) {
   EXPECT_NEAR(first, noisy, 0.005);
 }
 
+TEST(Denoise, ChartsKeepTheirLightWhereItCurves) {
+  const auto pools = [](int x, int y) {
+    const auto near = [&](float cx, float cy) {
+      const float dx = static_cast<float>(x) - cx, dy = static_cast<float>(y) - cy;
+      return 1.0f / (1.0f + 0.01f * (dx * dx + dy * dy));
+    };
+    return 0.1f + near(12.0f, 20.0f) + near(50.0f, 40.0f);
+  };
+  Page page(pools, 0.05f);
+  for (std::size_t i = 0; i < page.charts.size(); ++i) page.charts[i] = i % kSide < kSide / 2 ? 1 : 2;
+  const auto lightOf = [&](std::uint32_t chart) {
+    double sum = 0;
+    for (std::size_t i = 0; i < page.charts.size(); ++i)
+      if (page.charts[i] == chart) sum += static_cast<double>(page.flat.pixels[3 * i]);
+    return sum;
+  };
+  const double left = lightOf(1), right = lightOf(2);
+  page.denoise();
+  // Averaging alone takes 1.1% here; floats round to 6e-8.
+  EXPECT_NEAR(lightOf(1) / left, 1.0, 2e-6);
+  EXPECT_NEAR(lightOf(2) / right, 1.0, 2e-6);
+  EXPECT_LT(rmsError(page.flat, pools), 0.02);
+}
+
 TEST(Denoise, AShadowsEdgeStaysWhereItIs) {
   const auto truth = [](int x, int) { return x < kSide / 2 ? 1.0f : 0.2f; };
   Page page(truth, 0.05f);
