@@ -107,7 +107,7 @@ float Materials::alpha(const TrianglePoint& point) const {
   const Material& m = material(point.primitive->material);
   float a = m.baseColor.w;
   if (const Texture* texture = colorTexture(point.primitive->material))
-    a *= texture->sample(m.baseColorMap, uvAt(point, m.baseColorMap.uvSet)).w;
+    a *= texture->sampleAlpha(m.baseColorMap, uvAt(point, m.baseColorMap.uvSet));
   if (!point.primitive->colors.empty()) a *= interpolate(point, point.primitive->colors).w;
   return a;
 }

@@ -29,6 +29,7 @@ const Table& tableOf(ColorSpace space) {
 /// Texel index for a coordinate that may lie outside the image.
 int wrapTexel(std::int64_t i, int size, Wrap mode) {
   const std::int64_t n = size;
+  if (i >= 0 && i < n) return static_cast<int>(i);
   switch (mode) {
     case Wrap::Clamp:
       return static_cast<int>(std::clamp<std::int64_t>(i, 0, n - 1));
@@ -39,6 +40,12 @@ int wrapTexel(std::int64_t i, int size, Wrap mode) {
     default:
       return static_cast<int>(((i % n) + n) % n);
   }
+}
+
+/// (std::floor is a call where processors without SSE 4.1 are served.)
+std::int64_t floorOf(float x) {
+  const auto towardsZero = static_cast<std::int64_t>(x);
+  return x < static_cast<float>(towardsZero) ? towardsZero - 1 : towardsZero;
 }
 
 /// Far from the origin a float UV no longer tells texels apart; limits keep the integer arithmetic defined.
@@ -81,43 +88,61 @@ Expected<Texture> Texture::decode(const ImageSource& source, ColorSpace space) {
 }
 
 Vec4 Texture::fetch(int x, int y) const {
-  const std::size_t at =
-      4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x));
-  if (bytes_.empty()) return {floats_[at], floats_[at + 1], floats_[at + 2], floats_[at + 3]};
+  return fetch(4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)));
+}
+
+Vec4 Texture::fetch(std::size_t first) const {
+  if (bytes_.empty()) return {floats_[first], floats_[first + 1], floats_[first + 2], floats_[first + 3]};
   const Table& table = tableOf(space_);
-  return {table[bytes_[at]], table[bytes_[at + 1]], table[bytes_[at + 2]],
-          static_cast<float>(bytes_[at + 3]) / 255.0f};
+  return {table[bytes_[first]], table[bytes_[first + 1]], table[bytes_[first + 2]], fetchAlpha(first)};
+}
+
+float Texture::fetchAlpha(std::size_t first) const {
+  return bytes_.empty() ? floats_[first + 3] : static_cast<float>(bytes_[first + 3]) / 255.0f;
+}
+
+Texture::Footprint Texture::footprint(const TextureRef& ref, Vec2 uv) const {
+  const Vec3 transformed = ref.uvMatrix * Vec3(uv, 1.0f);
+  const float offset = ref.nearest ? 0.0f : 0.5f;
+  const float x = tameCoordinate(transformed.x) * static_cast<float>(width_) - offset;
+  const float y = tameCoordinate(transformed.y) * static_cast<float>(height_) - offset;
+  const std::int64_t left = floorOf(x), top = floorOf(y);
+  const std::int64_t further = ref.nearest ? 0 : 1;
+  const int columns[2] = {wrapTexel(left, width_, ref.wrapU), wrapTexel(left + further, width_, ref.wrapU)};
+  const int rows[2] = {wrapTexel(top, height_, ref.wrapV), wrapTexel(top + further, height_, ref.wrapV)};
+  Footprint at;
+  for (int j = 0; j < 2; ++j)
+    for (int i = 0; i < 2; ++i)
+      at.first[j][i] = 4 * (static_cast<std::size_t>(rows[j]) * static_cast<std::size_t>(width_) +
+                            static_cast<std::size_t>(columns[i]));
+  if (ref.nearest) return at;
+  at.fx = x - static_cast<float>(left);
+  at.fy = y - static_cast<float>(top);
+  return at;
 }
 
 Vec4 Texture::sample(const TextureRef& ref, Vec2 uv) const {
-  const Vec3 transformed = ref.uvMatrix * Vec3(uv, 1.0f);
-  const float x = tameCoordinate(transformed.x) * static_cast<float>(width_);
-  const float y = tameCoordinate(transformed.y) * static_cast<float>(height_);
-  const auto texel = [&](std::int64_t i, std::int64_t j) {
-    return fetch(wrapTexel(i, width_, ref.wrapU), wrapTexel(j, height_, ref.wrapV));
-  };
-  if (ref.nearest) return texel(static_cast<std::int64_t>(std::floor(x)), static_cast<std::int64_t>(std::floor(y)));
-  const float left = std::floor(x - 0.5f), top = std::floor(y - 0.5f);
-  const float fx = x - 0.5f - left, fy = y - 0.5f - top;
-  const auto i = static_cast<std::int64_t>(left), j = static_cast<std::int64_t>(top);
-  return glm::mix(glm::mix(texel(i, j), texel(i + 1, j), fx), glm::mix(texel(i, j + 1), texel(i + 1, j + 1), fx), fy);
+  const Footprint at = footprint(ref, uv);
+  if (ref.nearest) return fetch(at.first[0][0]);
+  return glm::mix(glm::mix(fetch(at.first[0][0]), fetch(at.first[0][1]), at.fx),
+                  glm::mix(fetch(at.first[1][0]), fetch(at.first[1][1]), at.fx), at.fy);
+}
+
+float Texture::sampleAlpha(const TextureRef& ref, Vec2 uv) const {
+  const Footprint at = footprint(ref, uv);
+  if (ref.nearest) return fetchAlpha(at.first[0][0]);
+  return glm::mix(glm::mix(fetchAlpha(at.first[0][0]), fetchAlpha(at.first[0][1]), at.fx),
+                  glm::mix(fetchAlpha(at.first[1][0]), fetchAlpha(at.first[1][1]), at.fx), at.fy);
 }
 
 void Texture::prefetch(const TextureRef& ref, Vec2 uv) const {
-  const Vec3 transformed = ref.uvMatrix * Vec3(uv, 1.0f);
-  const float x = tameCoordinate(transformed.x) * static_cast<float>(width_) - 0.5f;
-  const float y = tameCoordinate(transformed.y) * static_cast<float>(height_) - 0.5f;
-  const int column = wrapTexel(static_cast<std::int64_t>(std::floor(x)), width_, ref.wrapU);
-  const auto top = static_cast<std::int64_t>(std::floor(y));
   // Of the footprint's two rows, the left texels: the right ones mostly share their cache lines.
-  for (const std::int64_t row : {top, top + 1}) {
-    const std::size_t at = 4 * (static_cast<std::size_t>(wrapTexel(row, height_, ref.wrapV)) *
-                                    static_cast<std::size_t>(width_) +
-                                static_cast<std::size_t>(column));
+  const Footprint at = footprint(ref, uv);
+  for (const auto& row : at.first) {
     if (bytes_.empty())
-      __builtin_prefetch(&floats_[at]);
+      __builtin_prefetch(&floats_[row[0]]);
     else
-      __builtin_prefetch(&bytes_[at]);
+      __builtin_prefetch(&bytes_[row[0]]);
   }
 }
 

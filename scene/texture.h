@@ -26,10 +26,22 @@ class Texture {
   Vec4 fetch(int x, int y) const;
   /// Bilinear (or nearest, as ref says) with wrap modes at ref.uvMatrix * uv; texel centres at (i + 0.5) / size.
   Vec4 sample(const TextureRef& ref, Vec2 uv) const;
+  /// The fourth component of sample() alone.
+  float sampleAlpha(const TextureRef& ref, Vec2 uv) const;
   /// Asks the processor to bring the texels that sample() will read closer. No effect on any result.
   void prefetch(const TextureRef& ref, Vec2 uv) const;
 
  private:
+  /// What sample() reads: the first texel of each of four, and how far between them.
+  struct Footprint {
+    std::size_t first[2][2];  // [row][column], into bytes_ or floats_
+    float fx = 0.0f;
+    float fy = 0.0f;
+  };
+  Footprint footprint(const TextureRef& ref, Vec2 uv) const;
+  Vec4 fetch(std::size_t first) const;
+  float fetchAlpha(std::size_t first) const;
+
   int width_ = 0;
   int height_ = 0;
   ColorSpace space_ = ColorSpace::Linear;
