@@ -43,15 +43,6 @@ LUMEL_FOR_EACH_CPU int aimShadows(const ReceiverLanes& receivers, const LightSam
   return count;
 }
 
-/// For strategies that are sampled lane by lane.
-template <class Take>
-void sampleEach(const ReceiverLanes& receivers, LightSampleLanes& samples, Take take) {
-  for (int lane = 0; lane < kLanes; ++lane) {
-    const auto l = static_cast<std::size_t>(lane);
-    samples.set(l, receivers.active[l] ? take(receivers.p[l], receivers.ns[l], lane) : LightSample{});
-  }
-}
-
 }  // namespace
 
 std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& strategy, const ReceiverLanes& receivers,
@@ -59,20 +50,12 @@ std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& st
                         SampledLight& sampled) {
   LightSampleLanes taken;
   switch (strategy.kind) {
-    case LightStrategy::EveryPunctual: {
-      const UnitLanes choice = samples.draw1D(patternBase + kPunctual);
-      sampleEach(receivers, taken, [&](const Vec3& p, const Vec3& n, int lane) {
-        return transport.punctual.sample(p, n, choice.u[lane]);
-      });
+    case LightStrategy::EveryPunctual:
+      transport.punctual.sample(receivers, samples.draw1D(patternBase + kPunctual), taken);
       break;
-    }
-    case LightStrategy::NearPunctual: {
-      const UnitLanes choice = samples.draw1D(patternBase + kPunctual);
-      sampleEach(receivers, taken, [&](const Vec3& p, const Vec3& n, int lane) {
-        return transport.punctual.sampleNear(p, n, choice.u[lane]);
-      });
+    case LightStrategy::NearPunctual:
+      transport.punctual.sampleNear(receivers, samples.draw1D(patternBase + kPunctual), taken);
       break;
-    }
     case LightStrategy::OnePunctual:
       transport.punctual.sampleOne(strategy.light, receivers.p, taken);
       break;

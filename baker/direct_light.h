@@ -42,15 +42,6 @@ struct LightLanes {
   std::array<Receiver, kLanes> receivers;
 };
 
-/// The same by coordinates; a view.
-struct ReceiverLanes {
-  const LaneFlags& active;
-  const Vec3Lanes& p;
-  const Vec3Lanes& ng;
-  const Vec3Lanes& ns;
-  const Vec3Lanes& rayStart;
-};
-
 /// One light sample of every lane.
 struct SampledLight {
   Vec3Lanes wi;     // unit, towards the light

@@ -29,18 +29,33 @@ LightBounds boundsOf(const Light& light) {
   return bounds;
 }
 
-/// Candela over the square of the distance, with the range's window and the cone; nothing at the light itself.
-inline Vec3 facingNearby(const PunctualLights::Source& light, const Vec3& p, Vec3& wi) {
-  const Vec3 toLight = light.position - p;
+/// Irradiance per power: one over the square of the distance, with the range's window and the cone; nothing at the
+/// light itself.
+[[gnu::always_inline]] inline float attenuation(const Vec3& p, const Vec3& position, const Vec3& direction,
+                                                float perRange2, float cosOuter, float perCone, Vec3& wi) {
+  const Vec3 toLight = position - p;
   const float distance2 = glm::dot(toLight, toLight);
   const bool apart = distance2 > 0.0f;
   const float perDistance = 1.0f / std::sqrt(pick(apart, distance2, 1.0f));
   wi = toLight * perDistance;
-  const float share = distance2 * light.perRange2;
+  const float share = distance2 * perRange2;
   const float window = within(1.0f - share * share, 0.0f, 1.0f);
-  const float cone = within((-glm::dot(light.direction, wi) - light.cosOuter) * light.perCone, 0.0f, 1.0f);
-  const float attenuation = window * (cone * cone) * (perDistance * perDistance);
-  return light.power * pick(apart, attenuation, 0.0f);
+  const float cone = within((-glm::dot(direction, wi) - cosOuter) * perCone, 0.0f, 1.0f);
+  return pick(apart, window * (cone * cone) * (perDistance * perDistance), 0.0f);
+}
+
+[[gnu::always_inline]] inline Vec3 facingNearby(const PunctualLights::Source& light, const Vec3& p, Vec3& wi) {
+  return light.power *
+         attenuation(p, light.position, light.direction, light.perRange2, light.cosOuter, light.perCone, wi);
+}
+
+/// For the choice.
+[[gnu::always_inline]] inline float importanceOf(const PunctualLights::Source& light, const Vec3& p, const Vec3& n) {
+  Vec3 wi;
+  const Vec3 nearby = facingNearby(light, p, wi);
+  const float cosTheta = glm::dot(pick(light.distant, -light.direction, wi), n);
+  const float facing = luminance(pick(light.distant, light.power, nearby));
+  return pick(cosTheta > 0.0f, facing * (1.0f + 2.0f * cosTheta), 0.0f);
 }
 
 /// Sampled light of one source with a position, for all lanes.
@@ -116,21 +131,119 @@ void PunctualLights::sampleOne(std::size_t index, const Vec3Lanes& p, LightSampl
 }
 
 float PunctualLights::importance(std::size_t light, const Vec3& p, const Vec3& n) const {
-  Vec3 wi(0.0f);
-  const float facing = luminance(lights_[light].facing(p, wi));
-  const float cosTheta = glm::dot(wi, n);
-  return cosTheta > 0.0f ? facing * (1.0f + 2.0f * cosTheta) : 0.0f;
+  return importanceOf(lights_[light], p, n);
 }
 
-LightSample PunctualLights::choose(std::size_t first, const Vec3& p, const Vec3& n, float u) const {
+LightTree::Choice PunctualLights::chooseOne(std::size_t first, const Vec3& p, const Vec3& n, float u) const {
   if (tree_.empty()) return chooseAmong(first, lights_.size(), 0.0f, p, n, u);
   if (first == directional_) return chooseAmong(first, first, 1.0f, p, n, u);
   return chooseAmong(first, directional_, tree_.importance({p, n}), p, n, u);
 }
 
+LightSample PunctualLights::choose(std::size_t first, const Vec3& p, const Vec3& n, float u) const {
+  const LightTree::Choice choice = chooseOne(first, p, n, u);
+  if (!(choice.probability > 0.0f)) return {};
+  LightSample sample = sampleOne(choice.light, p);
+  sample.weight /= choice.probability;
+  return sample;
+}
+
+/// What sampling needs of the chosen lights.
+struct alignas(64) PunctualLights::Chosen {
+  Vec3Lanes power, position, direction;
+  float perRange2[kLanes];
+  float cosOuter[kLanes];
+  float perCone[kLanes];
+  int distant[kLanes];
+  int light[kLanes] = {};
+  float probability[kLanes] = {};  // 0: nothing was chosen
+
+  void set(std::size_t lane, const Source& source) {
+    power.set(lane, source.power);
+    position.set(lane, source.position);
+    direction.set(lane, source.direction);
+    perRange2[lane] = source.perRange2;
+    cosOuter[lane] = source.cosOuter;
+    perCone[lane] = source.perCone;
+    distant[lane] = source.distant ? 1 : 0;
+  }
+};
+
+/// As chooseAmong.
+LUMEL_FOR_EACH_CPU void PunctualLights::chooseAmongFew(std::span<const Source> few, const ReceiverLanes& at,
+                                                       const UnitLanes& u, Chosen& chosen) {
+  alignas(64) float each[kLocalLights][kLanes];
+  alignas(64) float total[kLanes] = {};
+  for (std::size_t k = 0; k < few.size(); ++k) {
+    const Source light = few[k];
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      each[k][lane] = importanceOf(light, at.p[lane], at.ns[lane]);
+      total[lane] += each[k][lane];
+    }
+  }
+  alignas(64) float before[kLanes] = {};
+  alignas(64) float taken[kLanes] = {};
+  for (std::size_t k = 0; k < few.size(); ++k) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      // The last one that is possible, until the target is passed.
+      const bool takes = (each[k][lane] > 0.0f) & !((taken[lane] > 0.0f) & (u.u[lane] * total[lane] < before[lane]));
+      before[lane] += each[k][lane];
+      taken[lane] = pick(takes, each[k][lane], taken[lane]);
+      chosen.light[lane] = takes ? static_cast<int>(k) : chosen.light[lane];
+    }
+  }
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    chosen.probability[lane] = taken[lane] / pick(total[lane] > 0.0f, total[lane], 1.0f);
+}
+
+LUMEL_FOR_EACH_CPU void PunctualLights::sampleChosen(const Chosen& chosen, const Vec3Lanes& p,
+                                                     LightSampleLanes& samples) {
+#pragma GCC ivdep
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    Vec3 wi;
+    const Vec3 power = chosen.power[lane], direction = chosen.direction[lane];
+    const float nearby = attenuation(p[lane], chosen.position[lane], direction, chosen.perRange2[lane],
+                                     chosen.cosOuter[lane], chosen.perCone[lane], wi);
+    const bool distant = chosen.distant[lane] != 0;
+    const bool any = chosen.probability[lane] > 0.0f;
+    const float probability = pick(any, chosen.probability[lane], 1.0f);
+    const float arriving = pick(any, pick(distant, 1.0f, nearby), 0.0f);
+    samples.wi.x[lane] = pick(distant, -direction.x, wi.x);
+    samples.wi.y[lane] = pick(distant, -direction.y, wi.y);
+    samples.wi.z[lane] = pick(distant, -direction.z, wi.z);
+    samples.weight.x[lane] = power.x * arriving / probability;
+    samples.weight.y[lane] = power.y * arriving / probability;
+    samples.weight.z[lane] = power.z * arriving / probability;
+    samples.target.x[lane] = chosen.position.x[lane];
+    samples.target.y[lane] = chosen.position.y[lane];
+    samples.target.z[lane] = chosen.position.z[lane];
+    samples.pdf[lane] = 0.0f;
+    samples.distant[lane] = chosen.distant[lane];
+  }
+}
+
+void PunctualLights::choose(std::size_t first, const ReceiverLanes& at, const UnitLanes& u,
+                            LightSampleLanes& samples) const {
+  Chosen chosen;
+  if (tree_.empty() && lights_.size() - first <= kLocalLights) {
+    chooseAmongFew(std::span(lights_).subspan(first), at, u, chosen);
+    for (int& light : chosen.light) light += static_cast<int>(first);
+  } else {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      if (!at.active[lane]) continue;
+      const LightTree::Choice choice = chooseOne(first, at.p[lane], at.ns[lane], u.u[lane]);
+      chosen.light[lane] = static_cast<int>(choice.light);
+      chosen.probability[lane] = choice.probability;
+    }
+  }
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    chosen.set(lane, lights_[static_cast<std::size_t>(chosen.light[lane])]);
+  sampleChosen(chosen, at.p, samples);
+}
+
 /// Among lights [first, end) and, if it has any importance, the tree.
-LightSample PunctualLights::chooseAmong(std::size_t first, std::size_t end, float treeImportance, const Vec3& p,
-                                        const Vec3& n, float u) const {
+LightTree::Choice PunctualLights::chooseAmong(std::size_t first, std::size_t end, float treeImportance,
+                                              const Vec3& p, const Vec3& n, float u) const {
   std::array<float, kLocalLights> few;
   std::vector<float> many;  // more directional lights than that are possible, if unlikely
   if (end - first > few.size()) many.resize(end - first);
@@ -147,20 +260,12 @@ LightSample PunctualLights::chooseAmong(std::size_t first, std::size_t end, floa
     before += importances[i - first];
     if (threshold < before) break;
   }
-  float probability = 0.0f;
-  if (chosen < end && (threshold < before || !(treeImportance > 0.0f))) {
-    probability = importances[chosen - first] / total;
-  } else {
-    const float rest = std::clamp((threshold - before) / treeImportance, 0.0f, 0x1.fffffep-1f);
-    const LightTree::Choice choice =
-        tree_.choose({p, n}, rest, [&](std::uint32_t light) { return importance(light, p, n); });
-    chosen = choice.light;
-    probability = choice.probability * (treeImportance / total);
-  }
-  if (!(probability > 0.0f)) return {};
-  LightSample sample = sampleOne(chosen, p);
-  sample.weight /= probability;
-  return sample;
+  if (chosen < end && (threshold < before || !(treeImportance > 0.0f)))
+    return {static_cast<std::uint32_t>(chosen), importances[chosen - first] / total};
+  const float rest = std::clamp((threshold - before) / treeImportance, 0.0f, 0x1.fffffep-1f);
+  LightTree::Choice choice = tree_.choose({p, n}, rest, [&](std::uint32_t light) { return importance(light, p, n); });
+  choice.probability *= treeImportance / total;
+  return choice;
 }
 
 }  // namespace lumel

@@ -39,6 +39,15 @@ struct alignas(64) LightSampleLanes {
   }
 };
 
+/// The points of a wave that receive light, both normals on the side that it is gathered on; a view.
+struct ReceiverLanes {
+  const LaneFlags& active;
+  const Vec3Lanes& p;
+  const Vec3Lanes& ng;
+  const Vec3Lanes& ns;
+  const Vec3Lanes& rayStart;
+};
+
 /// Point, spot and directional lights (KHR_lights_punctual).
 class PunctualLights {
  public:
@@ -54,8 +63,14 @@ class PunctualLights {
   /// ((1 + 2 cosTheta) / 3, so that the tilted basis vectors' weights stay bounded). Beyond kLocalLights a tree
   /// (LightTree) estimates that for groups of lights.
   LightSample sample(const Vec3& p, const Vec3& n, float u) const { return choose(0, p, n, u); }
+  void sample(const ReceiverLanes& at, const UnitLanes& u, LightSampleLanes& samples) const {
+    choose(0, at, u, samples);
+  }
   /// The same, without the directional lights.
   LightSample sampleNear(const Vec3& p, const Vec3& n, float u) const { return choose(directional_, p, n, u); }
+  void sampleNear(const ReceiverLanes& at, const UnitLanes& u, LightSampleLanes& samples) const {
+    choose(directional_, at, u, samples);
+  }
   /// What light `index` brings, without a choice.
   LightSample sampleOne(std::size_t index, const Vec3& p) const;
   void sampleOne(std::size_t index, const Vec3Lanes& p, LightSampleLanes& samples) const;
@@ -79,8 +94,14 @@ class PunctualLights {
 
  private:
   LightSample choose(std::size_t first, const Vec3& p, const Vec3& n, float u) const;
-  LightSample chooseAmong(std::size_t first, std::size_t end, float treeImportance, const Vec3& p, const Vec3& n,
-                          float u) const;
+  void choose(std::size_t first, const ReceiverLanes& at, const UnitLanes& u, LightSampleLanes& samples) const;
+  LightTree::Choice chooseOne(std::size_t first, const Vec3& p, const Vec3& n, float u) const;
+  LightTree::Choice chooseAmong(std::size_t first, std::size_t end, float treeImportance, const Vec3& p, const Vec3& n,
+                                float u) const;
+  /// The lights that the lanes chose, and with which probability.
+  struct Chosen;
+  static void chooseAmongFew(std::span<const Source> few, const ReceiverLanes& at, const UnitLanes& u, Chosen& chosen);
+  static void sampleChosen(const Chosen& chosen, const Vec3Lanes& p, LightSampleLanes& samples);
   float importance(std::size_t light, const Vec3& p, const Vec3& n) const;
 
   std::vector<Source> lights_;
