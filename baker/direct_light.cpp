@@ -45,6 +45,29 @@ LUMEL_FOR_EACH_CPU int aimShadows(const ReceiverLanes& receivers, const LightSam
 
 }  // namespace
 
+LUMEL_FOR_EACH_CPU void aimByCosine(const ReceiverLanes& receivers, const UnitSquareLanes& u, RayPacket& packet,
+                                    float* pdf) {
+  RTCRay16& ray = packet.rayhit.ray;
+  RTCHit16& hit = packet.rayhit.hit;
+#pragma GCC ivdep
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Vec3 local = sampleCosineHemisphere({u.x[lane], u.y[lane]});
+    const Vec3 world = frameAround(receivers.ns[lane]).fromLocal(local);
+    const bool above = glm::dot(world, receivers.ng[lane]) > 0.0f;
+    pdf[lane] = local.z * kInvPi;
+    ray.org_x[lane] = receivers.rayStart.x[lane];
+    ray.org_y[lane] = receivers.rayStart.y[lane];
+    ray.org_z[lane] = receivers.rayStart.z[lane];
+    ray.dir_x[lane] = world.x;
+    ray.dir_y[lane] = world.y;
+    ray.dir_z[lane] = world.z;
+    ray.tfar[lane] = std::numeric_limits<float>::infinity();
+    hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
+    hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
+    packet.valid[lane] = (receivers.active[lane] != 0) & above ? -1 : 0;
+  }
+}
+
 std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& strategy, const ReceiverLanes& receivers,
                         const SampleLanes& samples, std::uint32_t patternBase, const SurfaceDensity& density,
                         SampledLight& sampled) {

@@ -42,6 +42,10 @@ struct LightLanes {
   std::array<Receiver, kLanes> receivers;
 };
 
+/// Sends a ray from every active receiver into the hemisphere about its shading normal. Density: cosTheta / pi. Those
+/// that would go below the geometric surface are not valid.
+void aimByCosine(const ReceiverLanes& receivers, const UnitSquareLanes& u, RayPacket& packet, float* pdf);
+
 /// One light sample of every lane.
 struct SampledLight {
   Vec3Lanes wi;     // unit, towards the light

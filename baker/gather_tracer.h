@@ -140,41 +140,39 @@ class GatherTracer {
   }
 
   void shade(std::span<const Spot> chosen, std::size_t count) {
-    LightLanes lanes;
+    LaneFlags active{};
+    Vec3Lanes p, ng, ns, rayStart;
     SampleLanes samples;
-    std::array<TexelSampler, kLanes> samplers;
-    std::array<Spot, kLanes> spots;
-    std::copy(chosen.begin(), chosen.end(), spots.begin());
-    spots_.resize(spots_.size() - count);
-    for (std::size_t lane = 0; lane < count; ++lane) {
-      lanes.active[lane] = true;
-      lanes.receivers[lane] = spots[lane].receiver;
-      samplers[lane] = samplerAt(spots[lane].flight);
-      samples.setTexel(static_cast<int>(lane), samplers[lane]);
-      samples.setSample(static_cast<int>(lane), spots[lane].flight.sample);
-    }
-    shadowRays_ += directLight(
-        transport_, lanes, samples, 0, TraceMode::Packet, kCosineDensity,
-        [&](int lane, const Vec3& wi, const Vec3& light) {
-          const Spot& spot = spots[static_cast<std::size_t>(lane)];
-          sink_.light(spot.flight, light * (glm::dot(wi, spot.receiver.ns) * kInvPi), spot.flight.depth + 1);
-        });
-    RayPacket packet;
     std::array<Flight, kLanes> flights;
     for (std::size_t lane = 0; lane < count; ++lane) {
-      const Receiver& receiver = spots[lane].receiver;
-      const Vec3 local = sampleCosineHemisphere(samplers[lane].get2D(spots[lane].flight.sample, kDirection));
-      const Vec3 dirWorld = frameAround(receiver.ns).fromLocal(local);
-      if (!(glm::dot(dirWorld, receiver.ng) > 0.0f)) continue;
-      flights[lane] = spots[lane].flight;
+      const Spot& spot = chosen[lane];
+      active[lane] = 1;
+      p.set(lane, spot.receiver.p);
+      ng.set(lane, spot.receiver.ng);
+      ns.set(lane, spot.receiver.ns);
+      rayStart.set(lane, spot.receiver.rayStart);
+      flights[lane] = spot.flight;
+      samples.setTexel(static_cast<int>(lane), samplerAt(spot.flight));
+      samples.setSample(static_cast<int>(lane), spot.flight.sample);
+    }
+    spots_.resize(spots_.size() - count);
+    const ReceiverLanes receivers{active, p, ng, ns, rayStart};
+    shadowRays_ += directLight(transport_, receivers, samples, 0, TraceMode::Packet, kCosineDensity,
+                               [&](int lane, const Vec3& wi, const Vec3& light) {
+                                 const auto l = static_cast<std::size_t>(lane);
+                                 sink_.light(flights[l], light * (glm::dot(wi, ns[l]) * kInvPi), flights[l].depth + 1);
+                               });
+    alignas(64) float pdf[kLanes];
+    aimByCosine(receivers, samples.draw2D(kDirection), packet_, pdf);
+    for (std::size_t lane = 0; lane < count; ++lane) {
+      if (!packet_.valid[lane]) continue;
       ++flights[lane].depth;
-      flights[lane].origin = receiver.p;
-      flights[lane].pdf = cosineHemispherePdf(local.z);
-      packet.set(static_cast<int>(lane), receiver.rayStart, dirWorld);
+      flights[lane].origin = p[lane];
+      flights[lane].pdf = pdf[lane];
       ++rays_;
     }
-    transport_.rays.intersect(packet, TraceMode::Packet);
-    arriveAll(packet, [&](int lane) -> const Flight& { return flights[static_cast<std::size_t>(lane)]; });
+    transport_.rays.intersect(packet_, TraceMode::Packet);
+    arriveAll(packet_, [&](int lane) -> const Flight& { return flights[static_cast<std::size_t>(lane)]; });
   }
 
   const LightTransport& transport_;
@@ -183,6 +181,7 @@ class GatherTracer {
   const int lastDepth_;
   Sink& sink_;
   std::vector<Spot> spots_;
+  RayPacket packet_;  // of rays that go on
   std::uint64_t rays_ = 0;
   std::uint64_t shadowRays_ = 0;
 };

@@ -50,12 +50,9 @@ LightBounds boundsOf(const Light& light) {
 }
 
 /// For the choice.
-[[gnu::always_inline]] inline float importanceOf(const PunctualLights::Source& light, const Vec3& p, const Vec3& n) {
-  Vec3 wi;
-  const Vec3 nearby = facingNearby(light, p, wi);
-  const float cosTheta = glm::dot(pick(light.distant, -light.direction, wi), n);
-  const float facing = luminance(pick(light.distant, light.power, nearby));
-  return pick(cosTheta > 0.0f, facing * (1.0f + 2.0f * cosTheta), 0.0f);
+[[gnu::always_inline]] inline float importanceOf(const Vec3& facing, const Vec3& wi, const Vec3& n) {
+  const float cosTheta = glm::dot(wi, n);
+  return pick(cosTheta > 0.0f, luminance(facing) * (1.0f + 2.0f * cosTheta), 0.0f);
 }
 
 /// Sampled light of one source with a position, for all lanes.
@@ -131,7 +128,9 @@ void PunctualLights::sampleOne(std::size_t index, const Vec3Lanes& p, LightSampl
 }
 
 float PunctualLights::importance(std::size_t light, const Vec3& p, const Vec3& n) const {
-  return importanceOf(lights_[light], p, n);
+  Vec3 wi;
+  const Vec3 facing = lights_[light].facing(p, wi);
+  return importanceOf(facing, wi, n);
 }
 
 LightTree::Choice PunctualLights::chooseOne(std::size_t first, const Vec3& p, const Vec3& n, float u) const {
@@ -176,10 +175,17 @@ LUMEL_FOR_EACH_CPU void PunctualLights::chooseAmongFew(std::span<const Source> f
   alignas(64) float total[kLanes] = {};
   for (std::size_t k = 0; k < few.size(); ++k) {
     const Source light = few[k];
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      each[k][lane] = importanceOf(light, at.p[lane], at.ns[lane]);
-      total[lane] += each[k][lane];
+    if (light.distant) {
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        each[k][lane] = importanceOf(light.power, -light.direction, at.ns[lane]);
+    } else {
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        Vec3 wi;
+        const Vec3 facing = facingNearby(light, at.p[lane], wi);
+        each[k][lane] = importanceOf(facing, wi, at.ns[lane]);
+      }
     }
+    for (std::size_t lane = 0; lane < kLanes; ++lane) total[lane] += each[k][lane];
   }
   alignas(64) float before[kLanes] = {};
   alignas(64) float taken[kLanes] = {};
