@@ -95,12 +95,13 @@ class GatherTracer {
     leaveToShade(flight, hit, albedoAt(hit.part, packet, lane, hit));
   }
 
-  /// Follows what was left to be shaded on the spot, in full packets.
+  /// Follows what was left to be shaded on the spot, while it fills packets.
+  void shadeFull() {
+    while (spots_.size() >= kLanes) shade(kLanes);
+  }
+  /// Follows all.
   void finish() {
-    while (!spots_.empty()) {
-      const std::size_t count = std::min<std::size_t>(kLanes, spots_.size());
-      shade(std::span(spots_).last(count), count);
-    }
+    while (!spots_.empty()) shade(std::min<std::size_t>(kLanes, spots_.size()));
   }
 
   std::uint64_t rays() const { return rays_; }
@@ -139,13 +140,14 @@ class GatherTracer {
     spots_.push_back(spot);
   }
 
-  void shade(std::span<const Spot> chosen, std::size_t count) {
+  /// The last `count` spots.
+  void shade(std::size_t count) {
     LaneFlags active{};
     Vec3Lanes p, ng, ns, rayStart;
     SampleLanes samples;
     std::array<Flight, kLanes> flights;
     for (std::size_t lane = 0; lane < count; ++lane) {
-      const Spot& spot = chosen[lane];
+      const Spot& spot = spots_[spots_.size() - count + lane];
       active[lane] = 1;
       p.set(lane, spot.receiver.p);
       ng.set(lane, spot.receiver.ng);

@@ -384,6 +384,7 @@ void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
     }
     if (!inFlight(3)) continue;
     collect(packet(3), tracer, sink);
+    tracer.shadeFull();
     // Sums of a few samples lose nothing as floats.
     if ((packet(3).cell & 15u) == 15u) settle(sink.sums, sink.totals);
   }
