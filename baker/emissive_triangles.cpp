@@ -250,16 +250,18 @@ LUMEL_FOR_EACH_CPU void EmissiveTriangles::samplePoints(const Vec3Lanes& p, cons
 void EmissiveTriangles::sample(const Vec3Lanes& p, const LaneFlags& active, const UnitLanes& uTriangle,
                                const UnitSquareLanes& uPoint, LightSampleLanes& samples) const {
   Chosen chosen;
-  if (!few_.empty())
+  if (!few_.empty()) {
     chooseAmongFew(few_, p, uTriangle, chosen);
-  else
+  } else {
+    LightTree::Descent descent;
+    tree_.descend(p, Vec3Lanes(), active, uTriangle.u, descent);
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      if (!active[lane]) continue;
       const Vec3 at = p[lane];
-      const LightTree::Choice choice = tree_.choose(
-          {at}, uTriangle.u[lane], [&](std::uint32_t triangle) { return importance(triangle, at); });
+      const LightTree::Choice choice =
+          tree_.chooseInLeaf(descent, lane, [&](std::uint32_t triangle) { return importance(triangle, at); });
       if (choice.probability > 0.0f) chosen.set(lane, triangles_[choice.light], choice);
     }
+  }
   samplePoints(p, uPoint, chosen, samples);
   if (uniform_) return;
   const std::vector<Emitter>& from = few_.empty() ? triangles_ : few_;

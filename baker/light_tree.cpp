@@ -16,16 +16,18 @@ constexpr int kHalveBelow = 32;
 /// Mean of 1 + 2 cosTheta over a hemisphere.
 constexpr float kAnySide = 2.0f;
 
-float sineOf(float cosine) { return std::sqrt(std::max(0.0f, 1.0f - cosine * cosine)); }
+[[gnu::always_inline]] inline float rootOf(float x) { return std::sqrt(pick(x > 0.0f, x, 0.0f)); }
+[[gnu::always_inline]] inline float sineOf(float cosine) { return rootOf(1.0f - cosine * cosine); }
 
 /// Cosine and sine of max(0, a - b) for angles in [0, pi] given by theirs.
 struct Angle {
   float cosine = 1.0f;
   float sine = 0.0f;
 };
-Angle lessened(const Angle& a, const Angle& b) {
-  if (a.cosine > b.cosine) return {};
-  return {a.cosine * b.cosine + a.sine * b.sine, a.sine * b.cosine - a.cosine * b.sine};
+[[gnu::always_inline]] inline Angle lessened(const Angle& a, const Angle& b) {
+  const bool none = a.cosine > b.cosine;
+  return {pick(none, 1.0f, a.cosine * b.cosine + a.sine * b.sine),
+          pick(none, 0.0f, a.sine * b.cosine - a.cosine * b.sine)};
 }
 
 /// The smallest cone about two: its axis lies between theirs.
@@ -150,7 +152,15 @@ void LightTree::build(std::span<const LightBounds> lights, std::size_t first, st
   const std::span<std::uint32_t> group = std::span(order_).subspan(first, count);
   LightBounds bounds;
   for (const std::uint32_t light : group) unite(bounds, lights[light]);
-  nodes_[at].bounds = bounds;
+  nodes_[at].group = {.centre = centreOf(bounds),
+                      .half = 0.5f * (bounds.max - bounds.min),
+                      .axis = bounds.axis,
+                      .radius2 = 0.25f * glm::dot(bounds.max - bounds.min, bounds.max - bounds.min),
+                      .cosSpread = bounds.cosSpread,
+                      .sinSpread = sineOf(bounds.cosSpread),
+                      .cosEmit = bounds.cosEmit,
+                      .power = bounds.power,
+                      .reach = bounds.reach};
   if (count <= kLeaf) {
     nodes_[at].first = static_cast<std::uint32_t>(first);
     nodes_[at].count = static_cast<std::uint32_t>(count);
@@ -172,31 +182,126 @@ void LightTree::build(std::span<const LightBounds> lights, std::size_t first, st
   build(lights, first + left, count - left, at, depth + 1);
 }
 
-float LightTree::importanceOf(const LightBounds& bounds, const LightQuery& query) {
-  const Vec3 toCentre = centreOf(bounds) - query.p;
-  const Vec3 half = 0.5f * (bounds.max - bounds.min);
+[[gnu::always_inline]] inline float LightTree::importanceOf(const Group& group, const LightQuery& query) {
+  const Vec3 toCentre = group.centre - query.p;
   const float distance2 = glm::dot(toCentre, toCentre);
-  const float radius2 = glm::dot(half, half);
-  if (std::isfinite(bounds.reach)) {
-    const Vec3 outside = glm::max(glm::abs(toCentre) - half, Vec3(0.0f));
-    if (glm::dot(outside, outside) > bounds.reach * bounds.reach) return 0.0f;
-  }
+  const auto beyond = [](float to, float half) { return pick(std::abs(to) > half, std::abs(to) - half, 0.0f); };
+  const Vec3 outside(beyond(toCentre.x, group.half.x), beyond(toCentre.y, group.half.y),
+                     beyond(toCentre.z, group.half.z));
+  const bool reaches = !(glm::dot(outside, outside) > group.reach * group.reach);
   // From inside of the bounding sphere lights may lie in any direction and shine from any side.
-  if (!(distance2 > radius2)) return radius2 > 0.0f ? kAnySide * bounds.power / radius2 : 0.0f;
-  const Vec3 wi = toCentre / std::sqrt(distance2);
-  const float sineAround = std::sqrt(radius2 / distance2);
+  const bool isOutside = distance2 > group.radius2;
+  const float inside = pick(group.radius2 > 0.0f, kAnySide * group.power / pick(group.radius2 > 0.0f, group.radius2, 1.0f), 0.0f);
+  const float perDistance2 = 1.0f / pick(isOutside, distance2, 1.0f);
+  const Vec3 wi = toCentre * std::sqrt(perDistance2);
+  const float sine2 = group.radius2 * perDistance2;
   // A little wider than the sphere looks, for rounding.
-  const Angle around{sineOf(sineAround) - 1e-4f, std::min(1.0f, sineAround + 1e-4f)};
-  const float cosAxis = std::clamp(-glm::dot(bounds.axis, wi), -1.0f, 1.0f);
-  const Angle off =
-      lessened(lessened({cosAxis, sineOf(cosAxis)}, {bounds.cosSpread, sineOf(bounds.cosSpread)}), around);
-  if (off.cosine <= bounds.cosEmit) return 0.0f;
-  const float importance = bounds.power * off.cosine / distance2;
-  if (query.n == Vec3(0.0f)) return kAnySide * importance;
-  const float cosTheta = std::clamp(glm::dot(query.n, wi), -1.0f, 1.0f);
+  const Angle around{rootOf(1.0f - sine2) - 1e-4f, within(std::sqrt(sine2) + 1e-4f, 0.0f, 1.0f)};
+  const float cosAxis = within(-glm::dot(group.axis, wi), -1.0f, 1.0f);
+  const Angle off = lessened(lessened({cosAxis, sineOf(cosAxis)}, {group.cosSpread, group.sinSpread}), around);
+  const float importance = pick(off.cosine > group.cosEmit, group.power * off.cosine * perDistance2, 0.0f);
+  const float cosTheta = within(glm::dot(query.n, wi), -1.0f, 1.0f);
   const float most = lessened({cosTheta, sineOf(cosTheta)}, around).cosine;
   // As for directions: the tilted basis vectors need light at grazing angles.
-  return most > 0.0f ? importance * (1.0f + 2.0f * most) : 0.0f;
+  const float bySide = pick(most > 0.0f, 1.0f + 2.0f * most, 0.0f);
+  const bool anySide = (query.n.x == 0.0f) & (query.n.y == 0.0f) & (query.n.z == 0.0f);
+  return pick(reaches, pick(isOutside, importance * pick(anySide, kAnySide, bySide), inside), 0.0f);
+}
+
+float LightTree::importance(const LightQuery& query) const {
+  return empty() ? 0.0f : importanceOf(nodes_[0].group, query);
+}
+
+std::array<float, 2> LightTree::importancesBelow(std::uint32_t node, const LightQuery& query) const {
+  return {importanceOf(nodes_[node + 1].group, query), importanceOf(nodes_[nodes_[node].right].group, query)};
+}
+
+struct alignas(64) LightTree::GroupLanes {
+  Vec3Lanes centre, half, axis;
+  float radius2[kLanes] = {};
+  float cosSpread[kLanes] = {};
+  float sinSpread[kLanes] = {};
+  float cosEmit[kLanes] = {};
+  float power[kLanes] = {};
+  float reach[kLanes] = {};
+
+  void set(std::size_t lane, const Group& group) {
+    centre.set(lane, group.centre);
+    half.set(lane, group.half);
+    axis.set(lane, group.axis);
+    radius2[lane] = group.radius2;
+    cosSpread[lane] = group.cosSpread;
+    sinSpread[lane] = group.sinSpread;
+    cosEmit[lane] = group.cosEmit;
+    power[lane] = group.power;
+    reach[lane] = group.reach;
+  }
+};
+
+LUMEL_FOR_EACH_CPU void LightTree::importanceLanes(const GroupLanes& groups, const Vec3Lanes& p, const Vec3Lanes& n,
+                                                   float* importances) {
+#pragma GCC ivdep
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Group group{groups.centre[lane],    groups.half[lane],      groups.axis[lane],
+                      groups.radius2[lane],   groups.cosSpread[lane], groups.sinSpread[lane],
+                      groups.cosEmit[lane],   groups.power[lane],     groups.reach[lane]};
+    importances[lane] = importanceOf(group, {p[lane], n[lane]});
+  }
+}
+
+/// From a node to one of its children, the left of which follows it; as in choose().
+LUMEL_FOR_EACH_CPU void LightTree::stepDown(const float* left, const float* right, const LaneFlags& second,
+                                            LaneFlags& going, Descent& descent) {
+#pragma GCC ivdep
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const bool goes = going[lane] != 0;
+    const float total = left[lane] + right[lane];
+    const bool any = total > 0.0f;
+    const float share = left[lane] / pick(any, total, 1.0f);
+    const double rest = descent.rest[lane];
+    const auto border = static_cast<double>(share);
+    const bool toLeft = (rest < border) | !(right[lane] > 0.0f);
+    const double below = toLeft ? rest : rest - border;
+    const double width = toLeft ? border : 1.0 - border;
+    const double perWidth = below / width;
+    descent.rest[lane] = goes & any ? perWidth : rest;
+    const float stepped = descent.probability[lane] * pick(toLeft, share, 1.0f - share);
+    descent.probability[lane] = pick(goes, pick(any, stepped, 0.0f), descent.probability[lane]);
+    const int child = toLeft ? descent.leaf[lane] + 1 : second[lane];
+    descent.leaf[lane] = goes & any ? child : descent.leaf[lane];
+    going[lane] = goes & any ? 1 : 0;
+  }
+}
+
+void LightTree::descend(const Vec3Lanes& p, const Vec3Lanes& n, const LaneFlags& active, const float* u,
+                        Descent& descent) const {
+  LaneFlags going{};
+  const bool split = nodes_[0].count == 0;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    descent.rest[lane] = split ? refine(u[lane], p[lane]) : static_cast<double>(u[lane]);
+    descent.probability[lane] = active[lane] ? 1.0f : 0.0f;
+    descent.leaf[lane] = 0;
+    going[lane] = active[lane] && split ? 1 : 0;
+  }
+  GroupLanes left, right;
+  LaneFlags second{};
+  alignas(64) float ofLeft[kLanes], ofRight[kLanes];
+  for (;;) {
+    bool any = false;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const Node& node = nodes_[static_cast<std::size_t>(descent.leaf[lane])];
+      going[lane] = going[lane] != 0 && node.count == 0 ? 1 : 0;
+      if (!going[lane]) continue;
+      any = true;
+      second[lane] = static_cast<int>(node.right);
+      left.set(lane, (&node + 1)->group);
+      right.set(lane, nodes_[node.right].group);
+    }
+    if (!any) return;
+    importanceLanes(left, p, n, ofLeft);
+    importanceLanes(right, p, n, ofRight);
+    stepDown(ofLeft, ofRight, second, going, descent);
+  }
 }
 
 }  // namespace lumel

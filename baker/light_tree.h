@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "baker/lanes.h"
 #include "scene/math.h"
 
 namespace lumel {
@@ -56,23 +57,55 @@ class LightTree {
   template <class Importance>
   Choice choose(const LightQuery& query, float u, Importance importance) const;
 
+  /// The same for all lanes that are `active`, in two steps: down to a leaf together, and then lane by lane.
+  struct Descent {
+    alignas(64) double rest[kLanes];
+    alignas(64) float probability[kLanes];  // 0: nothing can arrive
+    alignas(64) int leaf[kLanes];
+  };
+  void descend(const Vec3Lanes& p, const Vec3Lanes& n, const LaneFlags& active, const float* u, Descent& descent) const;
+  template <class Importance>
+  Choice chooseInLeaf(const Descent& descent, std::size_t lane, Importance importance) const {
+    if (!(descent.probability[lane] > 0.0f)) return {};
+    return chooseInLeaf(nodes_[static_cast<std::size_t>(descent.leaf[lane])], descent.rest[lane],
+                        descent.probability[lane], importance);
+  }
+
   /// With which choose() takes `light`: to rounding.
   template <class Importance>
   float probability(const LightQuery& query, std::uint32_t light, Importance importance) const;
 
   /// An estimate of what all lights together bring, for weighing the tree against other lights.
-  float importance(const LightQuery& query) const { return empty() ? 0.0f : importanceOf(nodes_[0].bounds, query); }
+  float importance(const LightQuery& query) const;
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu;
+  /// LightBounds, ready to be asked.
+  struct Group {
+    Vec3 centre{0}, half{0}, axis{0};
+    float radius2 = 0.0f;  // of the bounding sphere
+    float cosSpread = 1.0f, sinSpread = 0.0f;
+    float cosEmit = 0.0f;
+    float power = 0.0f;
+    float reach = 0.0f;
+  };
+  /// One for each lane.
+  struct GroupLanes;
   struct Node {
-    LightBounds bounds;
+    Group group;
     std::uint32_t parent = kNone;
     std::uint32_t right = 0;  // the left child follows its parent
     std::uint32_t first = 0;  // into order_
     std::uint32_t count = 0;  // 0: not a leaf
   };
-  static float importanceOf(const LightBounds& bounds, const LightQuery& query);
+  static float importanceOf(const Group& group, const LightQuery& query);
+  /// Of a node's children.
+  std::array<float, 2> importancesBelow(std::uint32_t node, const LightQuery& query) const;
+  static void importanceLanes(const GroupLanes& groups, const Vec3Lanes& p, const Vec3Lanes& n, float* importances);
+  static void stepDown(const float* left, const float* right, const LaneFlags& second, LaneFlags& going,
+                       Descent& descent);
+  template <class Importance>
+  Choice chooseInLeaf(const Node& leaf, double rest, float probability, Importance importance) const;
   void build(std::span<const LightBounds> lights, std::size_t first, std::size_t count, std::uint32_t parent,
              int depth);
   template <class Importance>
@@ -100,8 +133,7 @@ LightTree::Choice LightTree::choose(const LightQuery& query, float u, Importance
   float probability = 1.0f;
   double rest = nodes_[0].count > 0 ? static_cast<double>(u) : refine(u, query.p);
   while (nodes_[at].count == 0) {
-    const float left = importanceOf(nodes_[at + 1].bounds, query);
-    const float right = importanceOf(nodes_[nodes_[at].right].bounds, query);
+    const auto [left, right] = importancesBelow(at, query);
     if (!(left + right > 0.0f)) return {};
     const float share = left / (left + right);
     const auto border = static_cast<double>(share);
@@ -116,8 +148,13 @@ LightTree::Choice LightTree::choose(const LightQuery& query, float u, Importance
       at = nodes_[at].right;
     }
   }
+  return chooseInLeaf(nodes_[at], rest, probability, importance);
+}
+
+template <class Importance>
+LightTree::Choice LightTree::chooseInLeaf(const Node& leaf, double rest, float probability,
+                                          Importance importance) const {
   std::array<float, kLeaf> each{};
-  const Node& leaf = nodes_[at];
   const float total = leafImportances(leaf, importance, each);
   if (!(total > 0.0f)) return {};
   const float target = static_cast<float>(rest) * total;
@@ -144,8 +181,7 @@ float LightTree::probability(const LightQuery& query, std::uint32_t light, Impor
     if (order_[nodes_[at].first + i] == light) probability = each[i] / total;
   for (; nodes_[at].parent != kNone; at = nodes_[at].parent) {
     const std::uint32_t parent = nodes_[at].parent;
-    const float left = importanceOf(nodes_[parent + 1].bounds, query);
-    const float right = importanceOf(nodes_[nodes_[parent].right].bounds, query);
+    const auto [left, right] = importancesBelow(parent, query);
     if (!(left + right > 0.0f)) return 0.0f;
     const float share = left / (left + right);
     probability *= at == parent + 1 ? share : 1.0f - share;

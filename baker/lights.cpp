@@ -235,9 +235,15 @@ void PunctualLights::choose(std::size_t first, const ReceiverLanes& at, const Un
     chooseAmongFew(std::span(lights_).subspan(first), at, u, chosen);
     for (int& light : chosen.light) light += static_cast<int>(first);
   } else {
+    LightTree::Descent descent;
+    const bool byTree = !tree_.empty() && first == directional_;
+    if (byTree) tree_.descend(at.p, at.ns, at.active, u.u, descent);
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if (!at.active[lane]) continue;
-      const LightTree::Choice choice = chooseOne(first, at.p[lane], at.ns[lane], u.u[lane]);
+      const Vec3 p = at.p[lane], n = at.ns[lane];
+      const LightTree::Choice choice =
+          byTree ? tree_.chooseInLeaf(descent, lane, [&](std::uint32_t light) { return importance(light, p, n); })
+                 : chooseOne(first, p, n, u.u[lane]);
       chosen.light[lane] = static_cast<int>(choice.light);
       chosen.probability[lane] = choice.probability;
     }

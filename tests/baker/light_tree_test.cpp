@@ -52,6 +52,37 @@ std::vector<LightBounds> mixture(std::size_t count, Random& random) {
   return lights;
 }
 
+// Lanes in step, some of them without a point, end where each would by itself; a tree of one leaf has no step to take.
+TEST(LightTree, LanesDescendAsSinglePointsDo) {
+  Random random(4);
+  for (const std::size_t count : {std::size_t{3}, std::size_t{300}}) {
+    const std::vector<LightBounds> lights = mixture(count, random);
+    const LightTree tree(lights);
+    const auto importance = [&](std::uint32_t light) { return lights[light].power; };
+    for (int trial = 0; trial < 200; ++trial) {
+      Vec3Lanes p, n;
+      LaneFlags active;
+      std::array<float, kLanes> u;
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        p.set(lane, random.inBox(6.0f));
+        n.set(lane, trial % 2 ? random.direction() : Vec3(0.0f));
+        active[lane] = lane != 3;
+        u[lane] = random.unit();
+      }
+      LightTree::Descent descent;
+      tree.descend(p, n, active, u.data(), descent);
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        const LightTree::Choice choice = tree.chooseInLeaf(descent, lane, importance);
+        const LightTree::Choice one = tree.choose({p[lane], n[lane]}, u[lane], importance);
+        EXPECT_EQ(choice.probability, active[lane] ? one.probability : 0.0f);
+        if (choice.probability > 0.0f) {
+          EXPECT_EQ(choice.light, one.light);
+        }
+      }
+    }
+  }
+}
+
 TEST(LightTree, ProbabilitiesAddUpToOneAndMatchFrequencies) {
   Random random(1);
   const std::vector<LightBounds> lights = mixture(300, random);

@@ -224,6 +224,49 @@ TEST(EnvironmentLight, NothingIsBuiltWithoutAnImage) {
   EXPECT_FALSE(EnvironmentLight(constant).shines());
 }
 
+// For few lights and for a tree of them, with and without the directional ones.
+TEST(PunctualLights, LanesGiveWhatSinglePointsDo) {
+  for (const std::size_t count : {5u, 60u}) {
+    std::vector<Light> some(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const Vec2 place = sobol2D(static_cast<std::uint32_t>(i), 1);
+      some[i].type = i < 2 ? LightType::Directional : i % 2 ? LightType::Spot : LightType::Point;
+      some[i].position = {4.0f * place.x, 1.0f + place.y, 4.0f * place.y};
+      some[i].direction = glm::normalize(Vec3(place.x - 0.5f, -1.0f, place.y - 0.5f));
+      some[i].range = i % 3 == 0 ? 3.0f : 0.0f;
+    }
+    const PunctualLights lights(some);
+    for (std::uint32_t trial = 0; trial < 64; ++trial) {
+      LaneFlags active;
+      Vec3Lanes p, n;
+      UnitLanes u;
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        const auto number = trial * kLanes + static_cast<std::uint32_t>(lane);
+        const Vec2 place = sobol2D(number, 2);
+        active[lane] = 1;
+        p.set(lane, {4.0f * place.x, 0.0f, 4.0f * place.y});
+        n.set(lane, directionFromZ(2.0f * sobol2D(number, 3).x - 1.0f, sobol2D(number, 3).y));
+        u.u[lane] = sobol1D(number, 4);
+      }
+      const ReceiverLanes at{active, p, n, n, p};
+      for (const bool near : {false, true}) {
+        LightSampleLanes samples;
+        near ? lights.sampleNear(at, u, samples) : lights.sample(at, u, samples);
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+          const LightSample one = near ? lights.sampleNear(p[lane], n[lane], u.u[lane]) : lights.sample(p[lane], n[lane], u.u[lane]);
+          EXPECT_EQ(samples.weight[lane], one.weight);
+          if (one.weight == Vec3(0.0f)) continue;
+          EXPECT_EQ(samples.wi[lane], one.wi);
+          EXPECT_EQ(samples.distant[lane] != 0, one.distant);
+          if (!one.distant) {
+            EXPECT_EQ(samples.target[lane], one.target);
+          }
+        }
+      }
+    }
+  }
+}
+
 TEST(PunctualLights, ChoiceIsProportionalToWhatArrives) {
   Light near, far, behind;
   near.position = {0, 1, 0};
