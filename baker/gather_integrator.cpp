@@ -120,7 +120,6 @@ void GatherIntegrator::dropCache() {
   spreads_ = std::vector<LightSpread>();
   substitutes_ = std::vector<TexelMap::Substitute>();
   scene_.reflectance = {};
-  map_.dropPixels();
 }
 
 std::span<LightSpread> GatherIntegrator::spreadsOf(std::size_t wave) {
@@ -229,15 +228,18 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
 void GatherIntegrator::solveLinks(const WarmLinks& links, std::vector<Vec3> light, std::span<const Vec3> constant) {
   const CacheLevels& levels = scene_.levels;
   const std::size_t count = map_.size();
-  std::vector<Vec3> next(count);
-  const auto substitute = [&](std::vector<Vec3>& values) {
-    for (const TexelMap::Substitute& s : substitutes_) values[s.texel] = values[s.source];
+  // What links look up: one product instead of two values from all over the memory.
+  std::vector<Vec3> reflected(count);
+  const auto reflect = [&] {
+    for (const TexelMap::Substitute& s : substitutes_) light[s.texel] = light[s.source];
+    parallelFor(count, kSweepGrain, [&](std::size_t first, std::size_t last) {
+      for (std::size_t t = first; t < last; ++t) reflected[t] = reflectance_[t] * light[t];
+    });
   };
   const auto keep = [&](int level) {
-    for (std::size_t t = 0; t < count; ++t)
-      cache_[t * stored() + static_cast<std::size_t>(level)] = reflectance_[t] * light[t];
+    for (std::size_t t = 0; t < count; ++t) cache_[t * stored() + static_cast<std::size_t>(level)] = reflected[t];
   };
-  substitute(light);
+  reflect();
   if (!levels.endless && levels.base == 0) keep(0);
   const int sweeps = levels.endless ? kMostSweeps : levels.base + levels.count - 1;
   double before = 0.0;
@@ -254,27 +256,24 @@ void GatherIntegrator::solveLinks(const WarmLinks& links, std::vector<Vec3> ligh
           Vec3 found(0.0f);
           for (int ray = 0; ray < GatherWave::kWarmRays; ++ray, ++index, ++link) {
             if (*link == kNoTexel) continue;
-            Vec3 reflected = reflectance_[*link] * light[*link];
-            if (share != links.shares[w].end() && share->link == index) reflected *= unpackWeight(share++->weight);
-            found += reflected;
+            Vec3 from = reflected[*link];
+            if (share != links.shares[w].end() && share->link == index) from *= unpackWeight(share++->weight);
+            found += from;
           }
-          next[t] = constant[t] + found / static_cast<float>(GatherWave::kWarmRays);
-          sum += static_cast<double>(luminance(next[t]));
+          light[t] = constant[t] + found / static_cast<float>(GatherWave::kWarmRays);
+          sum += static_cast<double>(luminance(light[t]));
         }
       }
       parts[first / kWaveGrain] = sum;
     });
-    std::swap(light, next);
-    substitute(light);
+    reflect();
     if (!levels.endless && sweep >= levels.base) keep(sweep - levels.base);
     double total = 0.0;
     for (const double part : parts) total += part;
     if (levels.endless && total - before <= kSettled * total) break;
     before = total;
   }
-  if (!levels.endless) return;
-  for (std::size_t t = 0; t < count; ++t) light[t] *= reflectance_[t];
-  cache_ = std::move(light);
+  if (levels.endless) cache_ = std::move(reflected);
 }
 
 Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Progress& progress) {

@@ -411,26 +411,27 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
   const AimedRays& rays = packet.rays;
   const int level = scene_.levels.read(scene_.bounces, 0);
   const bool shines = scene_.transport.environment.shines();
+  alignas(64) std::array<float, kLanes> beta;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) beta[lane] = kInvPi / rays.pdf[lane];
   Vec3Lanes light, sky;
   if (shines && rays.packet.anyMissed())
     scene_.transport.environment.arriving(rays.packet.directions(), rays.pdf, sky);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (!rays.packet.valid[lane]) continue;
     ++sink.result.rays;
-    const float beta = kInvPi / rays.pdf[lane];
     const std::uint32_t texel = packet.lookup.texels[lane];
     if (texel != kNoTexel && level >= 0 && packet.lookup.near[lane]) {
       tracer.arriveNear(rays.packet, static_cast<int>(lane),
                         flightOf(lane, net_.sample(packet.cell, lane), points_[pointOf(packet.cell)], rays));
     } else if (texel != kNoTexel) {
-      if (level >= 0) light.set(lane, beta * sink.reflectedBy(texel)[level]);
-      sink.passOnLevels(lane, rays.dirTangent[lane], Vec3(beta), texel, 0);
+      if (level >= 0) light.set(lane, beta[lane] * sink.reflectedBy(texel)[level]);
+      sink.passOnLevels(lane, rays.dirTangent[lane], Vec3(beta[lane]), texel, 0);
     } else if (rays.packet.hit(static_cast<int>(lane))) {
       sink.point = pointOf(packet.cell) % WavePoints::kMost;
       tracer.arrive(rays.packet, static_cast<int>(lane),
                     flightOf(lane, net_.sample(packet.cell, lane), points_[pointOf(packet.cell)], rays));
     } else if (shines) {
-      light.set(lane, beta * sky[lane]);
+      light.set(lane, beta[lane] * sky[lane]);
       if (!isFinite(light[lane])) continue;
       if (scene_.indirectOnly) {
         sink.addSeen(lane, rays.dirTangent[lane], light[lane]);

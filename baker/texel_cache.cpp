@@ -11,8 +11,10 @@
 
 namespace lumel {
 
+namespace {
+
 /// Of a surface's triangle whose corners lie at `pixels` of its page: metres, 0 where it has no area there.
-static float texelWidth(const Surface& surface, std::size_t triangle, const std::array<Vec2, 3>& pixels) {
+float texelWidth(const Surface& surface, std::size_t triangle, const std::array<Vec2, 3>& pixels) {
   const auto corner = [&](std::size_t i) { return surface.positions[surface.indices[3 * triangle + i]]; };
   const float meters2 = glm::length(glm::cross(corner(1) - corner(0), corner(2) - corner(0)));
   const Vec2 u = pixels[1] - pixels[0], v = pixels[2] - pixels[0];
@@ -20,27 +22,72 @@ static float texelWidth(const Surface& surface, std::size_t triangle, const std:
   return texels > 0.0f ? std::sqrt(meters2 / texels) : 0.0f;
 }
 
+std::uint32_t tileBit(std::uint32_t x, std::uint32_t y) { return 4 * (y & 3u) + (x & 3u); }
+
+/// How many of the lowest 16 bits are set.
+[[gnu::always_inline]] inline std::uint32_t countBits(std::uint32_t bits) {
+  bits -= (bits >> 1) & 0x5555u;
+  bits = (bits & 0x3333u) + ((bits >> 2) & 0x3333u);
+  bits = (bits + (bits >> 4)) & 0x0f0fu;
+  return (bits + (bits >> 8)) & 0x1fu;
+}
+
+using LaneWords = std::array<std::uint32_t, kLanes>;
+
+/// The texel of each lane's pixel, `covered` and `first` of its tile given.
+LUMEL_FOR_EACH_CPU void countTexels(const LaneWords& first, const LaneWords& covered, const LaneWords& bits,
+                                    LaneWords& texels) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const std::uint32_t bit = 1u << bits[lane];
+    const std::uint32_t texel = first[lane] + countBits(covered[lane] & (bit - 1u));
+    texels[lane] = (covered[lane] & bit) != 0 ? texel : kNoTexel;
+  }
+}
+
+/// Positive where a ray runs along the normal that Embree gave.
+LUMEL_FOR_EACH_CPU void alongNormals(const RayPacket& packet, std::array<float, kLanes>& along) {
+  const RTCRay16& ray = packet.rayhit.ray;
+  const RTCHit16& hit = packet.rayhit.hit;
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    along[lane] = glm::dot(Vec3(ray.dir_x[lane], ray.dir_y[lane], ray.dir_z[lane]),
+                           Vec3(hit.Ng_x[lane], hit.Ng_y[lane], hit.Ng_z[lane]));
+}
+
+}  // namespace
+
 TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<PageTexels>& texels)
     : rays_(rays), atlas_(atlas), texels_(texels) {
   firstOfPage_.push_back(0);
+  pages_.push_back({.width = 1, .height = 1, .firstTile = 0, .tilesAcross = 1});
   std::size_t count = 0;
-  std::size_t pixels = 0;
+  std::size_t tiles = 1;
   for (const PageTexels& page : texels) {
     count += page.size();
     LUMEL_CHECK(count < kNoTexel);
     firstOfPage_.push_back(static_cast<std::uint32_t>(count));
-    pages_.push_back({page.width, page.height, pixels});
-    pixels += static_cast<std::size_t>(page.width) * static_cast<std::size_t>(page.height);
+    const auto across = static_cast<std::uint32_t>((page.width + 3) / 4);
+    pages_.push_back({page.width, page.height, static_cast<std::uint32_t>(tiles), across});
+    tiles += std::size_t{across} * static_cast<std::size_t>((page.height + 3) / 4);
+    LUMEL_CHECK(tiles < kNoTexel);
   }
-  pixels_.assign(pixels, kNoTexel);
-  for (std::size_t p = 0; p < texels.size(); ++p)
+  tiles_.resize(tiles);
+  for (std::size_t p = 0; p < texels.size(); ++p) {
+    const PageMap& page = pages_[p + 1];
     for (std::size_t i = 0; i < texels[p].size(); ++i) {
-      const TexelCoord at = texels[p].coords[i];
-      pixels_[pages_[p].first + std::size_t{at.y} * static_cast<std::size_t>(pages_[p].width) + at.x] =
-          firstOfPage_[p] + static_cast<std::uint32_t>(i);
+      const TexelCoord c = texels[p].coords[i];
+      const std::uint32_t texel = firstOfPage_[p] + static_cast<std::uint32_t>(i);
+      Tile& tile = tiles_[page.firstTile + std::size_t{c.y} / 4 * page.tilesAcross + c.x / 4];
+      if (tile.covered == 0) tile.first = texel;
+      tile.covered |= 1u << tileBit(c.x, c.y);
+      // The order of PageTexels: what comes later lies behind it in its tile.
+      LUMEL_CHECK(at(page, c.x, c.y) == texel);
     }
+  }
 
-  for (const ScenePart& part : rays.parts()) parts_.push_back({.shines = part.firstEmitter >= 0});
+  for (const ScenePart& part : rays.parts())
+    parts_.push_back({.shines = part.firstEmitter >= 0, .frontSign = part.worldPositions ? part.frontSign : 0.0f});
+  parts_.push_back({.frontSign = 1.0f});
+  triangles_.emplace_back();
   // Instances and primitives number surfaces; parts leave out what rays cannot hit.
   std::map<std::pair<int, const Primitive*>, std::uint32_t> partOf;
   for (std::uint32_t p = 0; p < rays.parts().size(); ++p)
@@ -53,12 +100,14 @@ TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<P
 
 void TexelMap::addSurface(std::uint32_t part, const Surface& surface) {
   const ScenePart& source = rays_.parts()[part];
-  std::int64_t& first = parts_[part].firstTriangle;
-  if (first < 0) {
-    first = static_cast<std::int64_t>(triangles_.size());
+  std::uint32_t& first = parts_[part].firstTriangle;
+  if (first == kNowhere) {
+    LUMEL_CHECK(triangles_.size() + source.primitive->triangleCount() < kNoTexel);
+    first = static_cast<std::uint32_t>(triangles_.size());
     triangles_.resize(triangles_.size() + source.primitive->triangleCount());
   }
-  const PageMap& page = pages_[static_cast<std::size_t>(surface.page)];
+  const std::uint32_t pageNumber = static_cast<std::uint32_t>(surface.page) + 1;
+  const PageMap& page = pages_[pageNumber];
   for (std::size_t t = 0; t < surface.triangleCount(); ++t) {
     const std::uint32_t sourceTriangle = surface.sourceTriangle[t];
     const std::uint32_t* sourceCorner = source.primitive->indices.data() + std::size_t{3} * sourceTriangle;
@@ -69,9 +118,8 @@ void TexelMap::addSurface(std::uint32_t part, const Surface& surface) {
         if (surface.sourceVertex[vertex] == sourceCorner[i])
           pixels[i] = surface.lightmapUvs[vertex] * Vec2(page.width, page.height);
       }
-    triangles_[static_cast<std::size_t>(first) + sourceTriangle] = {
-        pixels[0], pixels[1] - pixels[0], pixels[2] - pixels[0], static_cast<std::uint32_t>(surface.page),
-        texelWidth(surface, t, pixels)};
+    triangles_[std::size_t{first} + sourceTriangle] = {pixels[0], pixels[1] - pixels[0], pixels[2] - pixels[0],
+                                                       pageNumber, texelWidth(surface, t, pixels)};
   }
 }
 
@@ -83,8 +131,11 @@ std::size_t TexelMap::pageOf(std::uint32_t texel) const {
 
 std::uint32_t TexelMap::at(const PageMap& page, int x, int y) const {
   if (x < 0 || y < 0 || x >= page.width || y >= page.height) return kNoTexel;
-  return pixels_[page.first + static_cast<std::size_t>(y) * static_cast<std::size_t>(page.width) +
-                 static_cast<std::size_t>(x)];
+  const auto column = static_cast<std::uint32_t>(x);
+  const auto row = static_cast<std::uint32_t>(y);
+  const Tile& tile = tiles_[page.firstTile + std::size_t{row / 4} * page.tilesAcross + column / 4];
+  const std::uint32_t bit = 1u << tileBit(column, row);
+  return (tile.covered & bit) != 0 ? tile.first + countBits(tile.covered & (bit - 1u)) : kNoTexel;
 }
 
 bool TexelMap::fromBehind(std::uint32_t part, const RayPacket& packet, int lane) const {
@@ -112,11 +163,11 @@ std::uint32_t TexelMap::find(std::uint32_t part, const RayPacket& packet, int la
 }
 
 std::uint32_t TexelMap::under(std::uint32_t part, const RayPacket& packet, int lane) const {
-  const std::int64_t first = parts_[part].firstTriangle;
-  if (first < 0) return kNoTexel;
+  const std::uint32_t first = parts_[part].firstTriangle;
+  if (first == kNowhere) return kNoTexel;
   const RTCHit16& hit = packet.rayhit.hit;
-  const Triangle& triangle = triangles_[static_cast<std::size_t>(first) + hit.primID[lane]];
-  if (triangle.page == kNoTexel) return kNoTexel;
+  const Triangle& triangle = triangles_[std::size_t{first} + hit.primID[lane]];
+  if (triangle.page == kNowhere) return kNoTexel;
   const PageMap& page = pages_[triangle.page];
   const Vec2 pixel = triangle.at(hit.u[lane], hit.v[lane]);
   const std::uint32_t texel = at(page, static_cast<int>(std::floor(pixel.x)), static_cast<int>(std::floor(pixel.y)));
@@ -124,44 +175,47 @@ std::uint32_t TexelMap::under(std::uint32_t part, const RayPacket& packet, int l
 }
 
 void TexelMap::findTriangles(const RayPacket& packet, Lookup& lookup) const {
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    lookup.triangles[lane] = nullptr;
-    if (!packet.hit(static_cast<int>(lane))) continue;
-    const std::uint32_t part = rays_.partOf(packet, static_cast<int>(lane));
+  std::array<float, kLanes> along;
+  alongNormals(packet, along);
+  const auto none = static_cast<std::uint32_t>(parts_.size() - 1);
+  for (int lane = 0; lane < kLanes; ++lane) {
+    const auto l = static_cast<std::size_t>(lane);
+    const std::uint32_t part = packet.hit(lane) ? rays_.partOf(packet, lane) : none;
     const PartMap& map = parts_[part];
-    if (map.shines || map.firstTriangle < 0 || fromBehind(part, packet, static_cast<int>(lane))) continue;
-    lookup.triangles[lane] =
-        &triangles_[static_cast<std::size_t>(map.firstTriangle) + packet.rayhit.hit.primID[lane]];
-    __builtin_prefetch(lookup.triangles[lane]);
+    const bool isBack = map.frontSign != 0.0f ? along[l] * map.frontSign > 0.0f : fromBehind(part, packet, lane);
+    const bool isFound = (map.firstTriangle != kNowhere) & (map.shines == 0) & !isBack;
+    lookup.triangles[l] = isFound ? map.firstTriangle + packet.rayhit.hit.primID[lane] : kNowhere;
+    __builtin_prefetch(triangles_.data() + lookup.triangles[l]);
   }
 }
 
 void TexelMap::findPixels(const RayPacket& packet, Lookup& lookup) const {
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const Triangle* triangle = lookup.triangles[lane];
-    lookup.pixels[lane] = nullptr;
-    lookup.near[lane] = false;
-    if (!triangle || triangle->page == kNoTexel) continue;
-    const PageMap& page = pages_[triangle->page];
-    lookup.near[lane] = packet.rayhit.ray.tfar[lane] < Lookup::kNearTexels * triangle->texelMeters;
-    lookup.places[lane] = triangle->at(packet.rayhit.hit.u[lane], packet.rayhit.hit.v[lane]);
+    const Triangle& triangle = triangles_[lookup.triangles[lane]];
+    const PageMap& page = pages_[triangle.page];
+    const bool isFound = lookup.triangles[lane] != kNowhere;
+    const Vec2 place = triangle.at(pick(isFound, packet.rayhit.hit.u[lane], 0.0f), pick(isFound, packet.rayhit.hit.v[lane], 0.0f));
     // Rounding may lead over the page's border.
-    const int x = std::clamp(static_cast<int>(lookup.places[lane].x), 0, page.width - 1);
-    const int y = std::clamp(static_cast<int>(lookup.places[lane].y), 0, page.height - 1);
-    lookup.pixels[lane] = pixels_.data() + page.first +
-                          static_cast<std::size_t>(y) * static_cast<std::size_t>(page.width) +
-                          static_cast<std::size_t>(x);
-    __builtin_prefetch(lookup.pixels[lane]);
+    const auto x = static_cast<std::uint32_t>(std::clamp(static_cast<int>(place.x), 0, page.width - 1));
+    const auto y = static_cast<std::uint32_t>(std::clamp(static_cast<int>(place.y), 0, page.height - 1));
+    lookup.places[lane] = place;
+    lookup.near[lane] = packet.rayhit.ray.tfar[lane] < Lookup::kNearTexels * triangle.texelMeters;
+    lookup.bits[lane] = tileBit(x, y);
+    lookup.tiles[lane] = tiles_.data() + page.firstTile + std::size_t{y / 4} * page.tilesAcross + x / 4;
+    __builtin_prefetch(lookup.tiles[lane]);
   }
 }
 
 void TexelMap::findTexels(Lookup& lookup) const {
+  LaneWords first, covered;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const std::uint32_t* pixel = lookup.pixels[lane];
-    lookup.texels[lane] = pixel ? *pixel : kNoTexel;
-    if (pixel && *pixel == kNoTexel)
-      lookup.texels[lane] = texelBeside(pages_[lookup.triangles[lane]->page], lookup.places[lane]);
+    first[lane] = lookup.tiles[lane]->first;
+    covered[lane] = lookup.tiles[lane]->covered;
   }
+  countTexels(first, covered, lookup.bits, lookup.texels);
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    if (lookup.texels[lane] == kNoTexel && lookup.triangles[lane] != kNowhere)
+      lookup.texels[lane] = texelBeside(pages_[triangles_[lookup.triangles[lane]].page], lookup.places[lane]);
 }
 
 std::uint32_t TexelMap::chartOf(const PageTexels& page, std::size_t texel) const {
@@ -183,7 +237,7 @@ std::uint32_t TexelMap::nearestValid(std::size_t pageIndex, std::size_t texel,
       for (int dx = -ring; dx <= ring; dx += step) {
         const int distance2 = dx * dx + dy * dy;
         if (distance2 >= leastDistance2) continue;
-        const std::uint32_t found = this->at(pages_[pageIndex], at.x + dx, at.y + dy);
+        const std::uint32_t found = this->at(pages_[pageIndex + 1], at.x + dx, at.y + dy);
         if (found == kNoTexel || !valid[found] || chartOf(page, found - firstOfPage_[pageIndex]) != chart) continue;
         best = found;
         leastDistance2 = distance2;

@@ -18,12 +18,9 @@ inline constexpr std::uint32_t kNoTexel = 0xffffffffu;
 /// Covered texels of all pages are numbered through: page by page, in the order of PageTexels.
 class TexelMap {
  public:
-  /// Keeps references to its arguments. Memory: 4 bytes per pixel of every page, 32 per triangle of a part that has a
-  /// lightmap.
+  /// Keeps references to its arguments. Memory: half a byte per pixel of every page, 32 per triangle of a part that has
+  /// a lightmap.
   TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<PageTexels>& texels);
-
-  /// After this find and substitutes may not be asked any more.
-  void dropPixels() { pixels_ = std::vector<std::uint32_t>(); }
 
   std::size_t size() const { return firstOfPage_.back(); }
   std::uint32_t firstOfPage(std::size_t page) const { return firstOfPage_[page]; }
@@ -65,20 +62,31 @@ class TexelMap {
  private:
   struct alignas(32) Triangle {
     Vec2 pixel{0}, perU{0}, perV{0};  // on the page: of the first corner, and how it moves with the barycentrics
-    std::uint32_t page = kNoTexel;    // kNoTexel: no lightmap
-    float texelMeters = 0.0f;         // width of a texel on the surface
+    std::uint32_t page = 0;
+    float texelMeters = 0.0f;  // width of a texel on the surface
 
     Vec2 at(float u, float v) const { return pixel + u * perU + v * perV; }
   };
   struct PartMap {
-    std::int64_t firstTriangle = -1;  // into triangles_; -1: no lightmap
-    bool shines = false;
+    std::uint32_t firstTriangle = kNowhere;  // into triangles_; kNowhere: no lightmap
+    std::uint32_t shines = 0;
+    float frontSign = 0.0f;  // ScenePart::frontSign; 0: Embree places the part
   };
   struct PageMap {
     int width = 0;
     int height = 0;
-    std::size_t first = 0;  // into pixels_
+    std::uint32_t firstTile = 0;
+    std::uint32_t tilesAcross = 0;
   };
+  /// 4 x 4 pixels. Texels are numbered tile by tile (PageTexels::coords), so a texel is the first of its tile and as many
+  /// more as are covered before it: the map of a page fits into a processor's cache.
+  struct Tile {
+    std::uint32_t first = 0;
+    std::uint32_t covered = 0;  // bit 4 * (y % 4) + x % 4
+  };
+  /// Triangle, page and tile that stand for having none: lookups need no branches.
+  static constexpr std::uint32_t kNowhere = 0;
+
   void addSurface(std::uint32_t part, const Surface& surface);
   bool fromBehind(std::uint32_t part, const RayPacket& packet, int lane) const;
   std::uint32_t texelBeside(const PageMap& page, const Vec2& pixel) const;
@@ -90,9 +98,9 @@ class TexelMap {
   const Atlas& atlas_;
   const std::vector<PageTexels>& texels_;
   std::vector<std::uint32_t> firstOfPage_;  // [pages + 1]
-  std::vector<PageMap> pages_;
-  std::vector<std::uint32_t> pixels_;      // per pixel of every page: its texel or kNoTexel
-  std::vector<PartMap> parts_;
+  std::vector<PageMap> pages_;              // from 1 on
+  std::vector<Tile> tiles_;
+  std::vector<PartMap> parts_;  // and last one for rays that hit nothing
   std::vector<Triangle> triangles_;
 };
 
@@ -104,8 +112,9 @@ struct TexelMap::Lookup {
 
  private:
   friend TexelMap;
-  std::array<const Triangle*, kLanes> triangles;
-  std::array<const std::uint32_t*, kLanes> pixels;
+  std::array<std::uint32_t, kLanes> triangles;
+  std::array<const Tile*, kLanes> tiles;
+  std::array<std::uint32_t, kLanes> bits;  // of the pixel in its tile
   std::array<Vec2, kLanes> places;
 };
 
