@@ -25,9 +25,10 @@ inline std::uint32_t hashCombine(std::uint32_t seed, std::uint32_t value) {
 }
 
 inline std::uint32_t reverseBits(std::uint32_t x) {
+  // Bytes last, compilers see them being turned round and take an instruction that vectors of 512 bits need not have.
   x = (x >> 16) | (x << 16);
-  x = ((x >> 8) & 0x00ff00ffu) | ((x & 0x00ff00ffu) << 8);
   x = ((x >> 4) & 0x0f0f0f0fu) | ((x & 0x0f0f0f0fu) << 4);
+  x = ((x >> 8) & 0x00ff00ffu) | ((x & 0x00ff00ffu) << 8);
   x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
   return ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
 }
