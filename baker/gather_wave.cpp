@@ -307,7 +307,8 @@ GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::spa
   return result;
 }
 
-/// Light samples of each strategy, weighed so that they add up to as many as gather rays.
+/// Light samples of each strategy, weighed so that they add up to as many as gather rays. Strategies of equal power are
+/// sampled from the same points, which are drawn once.
 void GatherWave::gatherLight(const NetRange& net, std::span<LightSpread> spreads, GatherSink& sink) {
   const std::size_t strategies = scene_.strategies.size();
   if (startsLightStretch(net.first))
@@ -317,7 +318,24 @@ void GatherWave::gatherLight(const NetRange& net, std::span<LightSpread> spreads
     samplers[lane] = TexelSampler(samplers_[lane].seedOf(kLightStretch), lightStretch(net.first), 0, 0);
     lightSamples_.setTexel(static_cast<int>(lane), samplers[lane]);
   }
-  for (std::size_t k = 0; k < strategies; ++k) sampleStrategy(k, net, samplers, spreads[k], sink);
+  lightTallies_.assign(strategies, {});
+  const auto powerOf = [](const LightSpread& spread) { return spread.power; };
+  for (std::size_t k = 0; k < strategies; ++k) {
+    const int power = spreads[k].power;
+    if (std::ranges::count(spreads.first(k), power, powerOf) > 0) continue;
+    const std::uint32_t first = scaledBy(power, net.first);
+    const std::uint32_t count = std::max(1u, scaledBy(power, net.count()));
+    const float weight = kInvPi * static_cast<float>(net.count()) / static_cast<float>(count);
+    const std::uint32_t block = std::min(WavePoints::kMost, count);
+    for (std::uint32_t s = first; s < first + count; s += block) {
+      points_.draw(samplers, kFootprint, s, block);
+      for (std::size_t same = k; same < strategies; ++same)
+        if (spreads[same].power == power) sampleStrategy(same, s, s + block, weight, isPilot(net.first), sink);
+    }
+    for (std::size_t same = k; same < strategies; ++same)
+      if (isPilot(net.first) && spreads[same].power == power)
+        lightTallies_[same].enter(spreads[same], count, coveredCount_);
+  }
 }
 
 /// What a strategy's samples brought to the flat map, and would have brought with nothing in the way.
@@ -329,20 +347,11 @@ static void tallyLight(const SampledLight& sampled, const Vec3Lanes& dirTangent,
   }
 }
 
-void GatherWave::sampleStrategy(std::size_t strategy, const NetRange& net,
-                                const std::array<TexelSampler, kLanes>& samplers, LightSpread& spread,
+/// Samples [first, end), whose points are drawn.
+void GatherWave::sampleStrategy(std::size_t strategy, std::uint32_t first, std::uint32_t end, float weight, bool pilot,
                                 GatherSink& sink) {
-  const std::uint32_t first = scaledBy(spread.power, net.first);
-  const std::uint32_t count = std::max(1u, scaledBy(spread.power, net.count()));
-  const float weight = kInvPi * static_cast<float>(net.count()) / static_cast<float>(count);
-  const bool pilot = isPilot(net.first);
-  LightTally tally;
   SampledLight sampled;
-  for (std::uint32_t s = first; s < first + count; ++s) {
-    if ((s - first) % WavePoints::kMost == 0) {
-      points_.draw(samplers, kFootprint, s, std::min(WavePoints::kMost, count));
-      settle(sink.sums, sink.totals);
-    }
+  for (std::uint32_t s = first; s < end; ++s) {
     const PointLanes points = points_[s];
     lightSamples_.setSampleOfAll(s);
     const std::uint64_t rays = takeLight(scene_.transport, scene_.strategies[strategy], points.receivers(),
@@ -352,7 +361,7 @@ void GatherWave::sampleStrategy(std::size_t strategy, const NetRange& net,
     scene_.transport.rays.occluded(sampled.shadows, TraceMode::Packet);
     Vec3Lanes dirTangent;
     turnToTangent(points.frame, sampled.wi, dirTangent);
-    if (pilot) tallyLight(sampled, dirTangent, tally);
+    if (pilot) tallyLight(sampled, dirTangent, lightTallies_[strategy]);
     keepVisible(sampled.shadows, weight, sampled.light);
     sink.addToMaps(dirTangent, sampled.light, [s](std::size_t) { return s; });
     if (scene_.levels.endless) continue;
@@ -360,7 +369,6 @@ void GatherWave::sampleStrategy(std::size_t strategy, const NetRange& net,
       if (sampled.found(lane) && isFinite(sampled.light[lane]))
         sink.addToLevels(lane, dirTangent[lane], sampled.light[lane], 0);
   }
-  if (pilot) tally.enter(spread, count, coveredCount_);
   settle(sink.sums, sink.totals);
 }
 

@@ -136,8 +136,8 @@ class GatherWave {
   void warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts);
   Flight flightOf(std::size_t lane, std::uint32_t sample, const PointLanes& from, const AimedRays& rays) const;
   void gatherLight(const NetRange& net, std::span<LightSpread> spreads, GatherSink& sink);
-  void sampleStrategy(std::size_t strategy, const NetRange& net, const std::array<TexelSampler, kLanes>& samplers,
-                      LightSpread& spread, GatherSink& sink);
+  void sampleStrategy(std::size_t strategy, std::uint32_t first, std::uint32_t end, float weight, bool pilot,
+                      GatherSink& sink);
   void gatherRays(const NetRange& net, GatherSink& sink);
   /// A packet of gather rays, from its start to where the light of its texels is known.
   struct Packet {
@@ -157,6 +157,7 @@ class GatherWave {
   std::array<bool, kLanes> covered_{};
   std::size_t coveredCount_ = 0;
   SampleLanes lightSamples_;
+  std::vector<LightTally> lightTallies_;  // of the strategies
   NetLanes net_;
   CoherencePilot pilot_;
   static constexpr std::uint32_t kInFlight = 4;
