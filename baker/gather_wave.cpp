@@ -158,6 +158,7 @@ struct GatherSink {
 };
 
 std::uint32_t packWeight(const Vec3& weight) {
+  if (weight == Vec3(1.0f)) return 0x3fffffffu;
   std::uint32_t packed = 0;
   for (int i = 0; i < 3; ++i)
     packed |= static_cast<std::uint32_t>(std::lround(std::clamp(weight[i], 0.0f, 1.0f) * 1023.0f)) << (10 * i);

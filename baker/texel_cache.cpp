@@ -246,13 +246,38 @@ std::uint32_t TexelMap::nearestValid(std::size_t pageIndex, std::size_t texel,
   return best;
 }
 
-std::vector<std::uint8_t> TexelMap::buried(std::span<const std::uint8_t> hidden,
-                                           std::span<const std::uint8_t> valid) const {
-  std::vector<std::uint8_t> chartIsSeen(atlas_.charts.size(), 0);
-  std::vector<std::uint8_t> found(size(), 0);
+/// Per tile: whether one of its texels is `valid`.
+std::vector<std::uint8_t> TexelMap::tilesWith(std::span<const std::uint8_t> valid) const {
+  std::vector<std::uint8_t> tiles(tiles_.size(), 0);
+  for (std::size_t i = 0; i < tiles_.size(); ++i)
+    for (std::uint32_t t = tiles_[i].first; t < tiles_[i].first + countBits(tiles_[i].covered); ++t) tiles[i] |= valid[t];
+  return tiles;
+}
+
+/// Whether a tile within kReach of a texel, or little more, is valid.
+bool TexelMap::anyInReach(const PageMap& page, const TexelCoord& at, std::span<const std::uint8_t> tileIsValid) const {
+  const int x0 = std::max(0, at.x - kReach) / 4, x1 = std::min(page.width - 1, at.x + kReach) / 4;
+  const int y0 = std::max(0, at.y - kReach) / 4, y1 = std::min(page.height - 1, at.y + kReach) / 4;
+  for (int y = y0; y <= y1; ++y) {
+    const std::uint8_t* row = tileIsValid.data() + page.firstTile + static_cast<std::size_t>(y) * page.tilesAcross;
+    if (std::any_of(row + x0, row + x1 + 1, [](std::uint8_t v) { return v != 0; })) return true;
+  }
+  return false;
+}
+
+/// Per chart: whether one of its texels is `valid`.
+std::vector<std::uint8_t> TexelMap::chartsWith(std::span<const std::uint8_t> valid) const {
+  std::vector<std::uint8_t> charts(atlas_.charts.size(), 0);
   for (std::size_t p = 0; p < texels_.size(); ++p)
     for (std::size_t i = 0; i < texels_[p].size(); ++i)
-      if (valid[firstOfPage_[p] + i]) chartIsSeen[chartOf(texels_[p], i)] = 1;
+      if (valid[firstOfPage_[p] + i]) charts[chartOf(texels_[p], i)] = 1;
+  return charts;
+}
+
+std::vector<std::uint8_t> TexelMap::buried(std::span<const std::uint8_t> hidden,
+                                           std::span<const std::uint8_t> valid) const {
+  const std::vector<std::uint8_t> chartIsSeen = chartsWith(valid);
+  std::vector<std::uint8_t> found(size(), 0);
   for (std::size_t p = 0; p < texels_.size(); ++p)
     for (std::size_t i = 0; i < texels_[p].size(); ++i)
       if (hidden[firstOfPage_[p] + i]) found[firstOfPage_[p] + i] = chartIsSeen[chartOf(texels_[p], i)];
@@ -260,13 +285,18 @@ std::vector<std::uint8_t> TexelMap::buried(std::span<const std::uint8_t> hidden,
 }
 
 std::vector<TexelMap::Substitute> TexelMap::substitutes(std::span<const std::uint8_t> valid) const {
+  const std::vector<std::uint8_t> charts = chartsWith(valid);
+  const std::vector<std::uint8_t> tileIsValid = tilesWith(valid);
   std::vector<Substitute> all;
-  for (std::uint32_t t = 0; t < valid.size(); ++t)
-    if (!valid[t]) all.push_back({t, kNoTexel});
+  for (std::size_t p = 0; p < texels_.size(); ++p)
+    for (std::uint32_t i = 0; i < texels_[p].size(); ++i)
+      if (!valid[firstOfPage_[p] + i] && charts[chartOf(texels_[p], i)]) all.push_back({firstOfPage_[p] + i, kNoTexel});
   parallelFor(all.size(), 64, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       const std::size_t page = pageOf(all[i].texel);
-      all[i].source = nearestValid(page, all[i].texel - firstOfPage_[page], valid);
+      const std::size_t texel = all[i].texel - firstOfPage_[page];
+      if (anyInReach(pages_[page + 1], texels_[page].coords[texel], tileIsValid))
+        all[i].source = nearestValid(page, texel, valid);
     }
   });
   std::erase_if(all, [](const Substitute& s) { return s.source == kNoTexel; });

@@ -92,6 +92,9 @@ class TexelMap {
   std::uint32_t texelBeside(const PageMap& page, const Vec2& pixel) const;
   std::uint32_t at(const PageMap& page, int x, int y) const;
   std::uint32_t chartOf(const PageTexels& page, std::size_t texel) const;
+  std::vector<std::uint8_t> chartsWith(std::span<const std::uint8_t> valid) const;
+  std::vector<std::uint8_t> tilesWith(std::span<const std::uint8_t> valid) const;
+  bool anyInReach(const PageMap& page, const TexelCoord& at, std::span<const std::uint8_t> tileIsValid) const;
   std::uint32_t nearestValid(std::size_t page, std::size_t texel, std::span<const std::uint8_t> valid) const;
 
   const RayScene& rays_;

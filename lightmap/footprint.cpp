@@ -41,12 +41,14 @@ Polygon clipSide(const Polygon& in, int axis, double limit, double sign) {
 Polygon clipToTexel(const std::array<Vec2d, 3>& triangle, TexelCoord texel) {
   Polygon polygon;
   for (const Vec2d& p : triangle) polygon.add(p);
-  const double x = texel.x;
-  const double y = texel.y;
-  polygon = clipSide(polygon, 0, x, 1);
-  polygon = clipSide(polygon, 0, x + 1, -1);
-  polygon = clipSide(polygon, 1, y, 1);
-  return clipSide(polygon, 1, y + 1, -1);
+  const Vec2d least = glm::min(glm::min(triangle[0], triangle[1]), triangle[2]);
+  const Vec2d most = glm::max(glm::max(triangle[0], triangle[1]), triangle[2]);
+  for (int axis = 0; axis < 2; ++axis) {
+    const double from = axis == 0 ? texel.x : texel.y;
+    if (least[axis] < from) polygon = clipSide(polygon, axis, from, 1);
+    if (most[axis] > from + 1) polygon = clipSide(polygon, axis, from + 1, -1);
+  }
+  return polygon;
 }
 
 struct Corners {
