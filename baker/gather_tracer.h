@@ -90,9 +90,9 @@ class GatherTracer {
   }
 
   /// Shades the hit on the spot, although it has a texel.
-  void arriveNear(const RayPacket& packet, int lane, const Flight& flight) {
+  void arriveNear(const RayPacket& packet, int lane, const Flight& flight, std::uint32_t texel) {
     const HitSurface hit = transport_.rays.surfaceAt(packet, lane);
-    leaveToShade(flight, hit, albedoAt(hit.part, packet, lane, hit));
+    leaveToShade(flight, hit, reflectance_.empty() ? transport_.materials.albedo(hit.point) : reflectance_[texel]);
   }
 
   /// Follows what was left to be shaded on the spot, while it fills packets.

@@ -431,7 +431,7 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
     const std::uint32_t texel = packet.lookup.texels[lane];
     if (texel != kNoTexel && level >= 0 && packet.lookup.near[lane]) {
       tracer.arriveNear(rays.packet, static_cast<int>(lane),
-                        flightOf(lane, net_.sample(packet.cell, lane), points_[pointOf(packet.cell)], rays));
+                        flightOf(lane, net_.sample(packet.cell, lane), points_[pointOf(packet.cell)], rays), texel);
     } else if (texel != kNoTexel) {
       if (level >= 0) light.set(lane, beta[lane] * sink.reflectedBy(texel)[level]);
       sink.passOnLevels(lane, rays.dirTangent[lane], Vec3(beta[lane]), texel, 0);
