@@ -45,9 +45,11 @@ class Study {
         counting_.push_back(at);
   }
 
-  Indirect measure(Integrator integrator, int samples, std::uint64_t seed, bool denoise = false) const {
+  Indirect measure(Integrator integrator, int samples, std::uint64_t seed, bool denoise = false,
+                   float targetError = 0.0f) const {
     BakeOptions options{.samples = samples, .bounces = kAllBounces, .indirectOnly = true, .seed = seed};
     options.integrator = integrator;
+    options.targetError = targetError;
     BakeResult baked = run(options);
     if (denoise) finishPages(baked.pages, made_.atlas, texels_, {.denoise = true, .rings = 0});
     Indirect found;
@@ -108,30 +110,37 @@ void indirect(benchmark::State& state, Where where, int referenceSamples) {
     double noise = 0;
     for (std::size_t i = 0; i < a.light.size(); ++i) noise += std::pow(a.light[i] - b.light[i], 2) / 4;
     state.counters["reference_error"] = std::sqrt(noise / static_cast<double>(a.light.size())) / truth;
+    const auto judge = [&](const Indirect& x, const std::string& label) {
+      double sum = 0;
+      for (std::size_t i = 0; i < x.light.size(); ++i) sum += (x.light[i] - a.light[i]) * (x.light[i] - b.light[i]);
+      const double error = std::sqrt(std::max(0.0, sum / static_cast<double>(x.light.size()))) / truth;
+      state.counters[label + "_error"] = error;
+      state.counters[label + "_rays"] = x.raysPerTexel;
+      state.counters[label + "_bias"] = mean(x.light) / truth - 1;
+      return Point{x.raysPerTexel, error};
+    };
     const auto curveOf = [&](Integrator integrator, const char* name, std::initializer_list<int> counts,
                              bool denoise = false) {
       std::vector<Point> curve;
-      for (const int samples : counts) {
-        const Indirect x = study.measure(integrator, samples, 7, denoise);
-        double sum = 0;
-        for (std::size_t i = 0; i < x.light.size(); ++i) sum += (x.light[i] - a.light[i]) * (x.light[i] - b.light[i]);
-        const double error = std::sqrt(std::max(0.0, sum / static_cast<double>(x.light.size()))) / truth;
-        curve.push_back({x.raysPerTexel, error});
-        const std::string label = name + std::to_string(samples);
-        state.counters[label + "_error"] = error;
-        state.counters[label + "_rays"] = x.raysPerTexel;
-        state.counters[label + "_bias"] = mean(x.light) / truth - 1;
-      }
+      for (const int samples : counts)
+        curve.push_back(judge(study.measure(integrator, samples, 7, denoise), name + std::to_string(samples)));
       return curve;
     };
     const std::vector<Point> path = curveOf(Integrator::Path, "path", {64, 256, 1024, 2048});
     const std::vector<Point> gather = curveOf(Integrator::Gather, "gather", {16, 32, 64, 128, 256, 512, 1024});
     // What a bake hands out. Not a comparison of methods: paths could be denoised too.
-    curveOf(Integrator::Gather, "denoised", {16, 32, 64, 128, 256}, true);
+    const std::vector<Point> denoised = curveOf(Integrator::Gather, "denoised", {16, 32, 64, 128, 256}, true);
+    // Rays where they are needed: more samples where texels are still far from the target.
+    std::vector<Point> targeted;
+    for (const int permille : {80, 40, 30, 20, 15})
+      targeted.push_back(judge(study.measure(Integrator::Gather, 32, 7, false, 0.001f * static_cast<float>(permille)),
+                               "target" + std::to_string(permille)));
     for (const int percent : {5, 2}) {
       const std::string label = std::to_string(percent) + "pct";
       state.counters["path_rays_" + label] = raysFor(0.01 * percent, path);
       state.counters["gather_rays_" + label] = raysFor(0.01 * percent, gather);
+      state.counters["denoised_rays_" + label] = raysFor(0.01 * percent, denoised);
+      state.counters["targeted_rays_" + label] = raysFor(0.01 * percent, targeted);
       state.counters["fewer_" + label] = raysFor(0.01 * percent, path) / raysFor(0.01 * percent, gather);
     }
   }
