@@ -82,8 +82,8 @@ TEST(Inside, ViewsOfBacksCountAsTheyAre) {
     });
     EXPECT_GT(d.expected[0], 0.5);
     EXPECT_LT(d.expected[0], 0.8);
-    // The share of texels' points that are taken for buried ones.
-    EXPECT_NEAR(d.mean[0], 0.0, (samples < 256 ? 0.02 : 0.01) * d.expected[0]) << samples;
+    // Measured: 1.4% at 16 samples, 0.03% at 64. Without what is taken off for chance it is 0.7% at 64.
+    EXPECT_NEAR(d.mean[0], 0.0, (samples < 64 ? 0.02 : 0.003) * d.expected[0]) << samples;
   }
 }
 
