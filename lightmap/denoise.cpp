@@ -261,22 +261,20 @@ std::vector<double> lightOfCharts(const Image& flat, std::span<const std::uint32
   return light;
 }
 
-/// Gives every chart back the light that averaging took where it curves; texels share it by their noise.
-void restoreLight(const std::array<Image*, kMaps>& maps, const Judged& judged, const std::vector<double>& before) {
-  std::vector<double> missing = lightOfCharts(*maps[0], judged.chartIds);
-  for (std::size_t c = 0; c < before.size(); ++c) missing[c] = before[c] - missing[c];
-  const auto errorOf = [&](std::size_t texel) { return static_cast<double>(judged.errors[texel * judged.stride]); };
-  std::vector<double> noise(before.size(), 0.0);
-  for (std::size_t i = 0; i < judged.chartIds.size(); ++i) noise[judged.chartIds[i]] += errorOf(i);
-  parallelFor(judged.chartIds.size(), kTileRows * kTileColumns, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      const std::uint32_t chart = judged.chartIds[i];
-      if (chart == 0) continue;
-      const double gain = missing[chart] * errorOf(i) / (noise[chart] * static_cast<double>(luminanceAt(*maps[0], i)));
-      if (!std::isfinite(gain)) continue;  // a chart without noise, or with what is not a number; a black texel
+/// Gives every chart back the light that averaging took where it curves, in proportion to what its texels hold: shared by
+/// their noise, a texel that is dark but for one map would gain many times what that map holds.
+void restoreLight(const std::array<Image*, kMaps>& maps, std::span<const std::uint32_t> chartIds,
+                  const std::vector<double>& before) {
+  std::vector<double> gain = lightOfCharts(*maps[0], chartIds);
+  for (std::size_t c = 0; c < gain.size(); ++c) {
+    gain[c] = before[c] / gain[c];
+    // Texels of no chart stay as they are, and so do black charts and those with what is not a number.
+    if (c == 0 || !std::isfinite(gain[c])) gain[c] = 1.0;
+  }
+  parallelFor(chartIds.size(), kTileRows * kTileColumns, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i)
       for (Image* map : maps)
-        for (std::size_t c = 0; c < 3; ++c) map->pixels[3 * i + c] *= static_cast<float>(1.0 + gain);
-    }
+        for (std::size_t c = 0; c < 3; ++c) map->pixels[3 * i + c] *= static_cast<float>(gain[chartIds[i]]);
   });
 }
 
@@ -316,7 +314,7 @@ void denoise(Image& flat, std::array<Image, 3>& rnm, std::span<const std::uint32
       std::copy(strip[m].begin(), strip[m].end(),
                 before.maps[m]->pixels.begin() + static_cast<std::ptrdiff_t>(first * width * 3));
   }
-  restoreLight(before.maps, judged, light);
+  restoreLight(before.maps, chartIds, light);
 }
 
 }  // namespace lumel

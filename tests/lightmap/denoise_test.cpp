@@ -97,6 +97,26 @@ TEST(Denoise, ChartsKeepTheirLightWhereItCurves) {
   EXPECT_LT(rmsError(page.flat, pools), 0.02);
 }
 
+// Light that grazes a surface is in one tilted map and hardly in the flat one.
+TEST(Denoise, WhatIsGivenBackIsAShareOfWhatATexelHolds) {
+  const auto pool = [](int x, int y) {
+    const float dx = static_cast<float>(x) - 32.0f, dy = static_cast<float>(y) - 32.0f;
+    return 1.0f / (1.0f + 0.01f * (dx * dx + dy * dy));
+  };
+  Page page(pool, 0.05f);
+  for (int y = 0; y < 16; ++y)
+    for (int x = 0; x < 16; ++x) {
+      page.flat.setRgb(x, y, Vec3(1e-4f));
+      page.rnm[0].setRgb(x, y, Vec3(1.0f));
+    }
+  page.denoise();
+  for (int y = 2; y < 12; ++y)
+    for (int x = 2; x < 12; ++x) {
+      EXPECT_NEAR(page.rnm[0].rgb(x, y).x, 1.0f, 0.05f);
+      EXPECT_GE(page.flat.rgb(x, y).x, 0.0f);
+    }
+}
+
 TEST(Denoise, AShadowsEdgeStaysWhereItIs) {
   const auto truth = [](int x, int) { return x < kSide / 2 ? 1.0f : 0.2f; };
   Page page(truth, 0.05f);
