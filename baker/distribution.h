@@ -53,7 +53,7 @@ class Distribution {
   static std::size_t advance(const float* cumulative, std::size_t index, float u);
 
   std::size_t size_ = 0;
-  std::vector<float> cumulative_;     // [rows][size + kAhead], from 0 to as many ones as make it full
+  std::vector<float> cumulative_;    // [rows][size + kAhead], from 0 to as many ones as make it full
   std::vector<std::int32_t> guide_;  // [rows][size]: of u in [i, i + 1) / size, an index that is not too late
   std::vector<double> totals_;
 };

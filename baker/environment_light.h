@@ -89,9 +89,9 @@ class EnvironmentLight {
   std::vector<Cell> cells_;      // [rows][columns]; one for a constant sky
   std::vector<float> versines_;  // [rows + 1]: 1 - cos of the polar angle (from +y) of the rows' borders
   Distribution rows_;
-  Distribution columns_;                 // per row
+  Distribution columns_;                // per row
   std::vector<std::int32_t> sunCells_;  // ascending
-  Distribution sun_;                     // over sunCells_
+  Distribution sun_;                    // over sunCells_
 };
 
 }  // namespace lumel

@@ -15,8 +15,8 @@ namespace {
 constexpr std::uint32_t kFirstPass = 8;
 /// Fewest samples after which an error estimate may end the work on a texel: two doublings.
 constexpr std::uint32_t kFirstJudged = 32;
-/// A wave that meets the target goes on with more than so many of the eight around it that do not (a straight border has
-/// three): estimates scatter, and waves that stop by themselves would show as streaks in the sample counts.
+/// A wave that meets the target goes on with more than so many of the eight around it that do not (a straight border
+/// has three): estimates scatter, and waves that stop by themselves would show as streaks in the sample counts.
 constexpr std::ptrdiff_t kMostUnmetAround = 3;
 /// Calibrated: 93 to 97% of texels lie within 1.96 standard errors.
 constexpr double kGatherCredit = 0.5;

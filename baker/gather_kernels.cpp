@@ -57,7 +57,8 @@ LUMEL_FOR_EACH_CPU int differentNeighbours(const RayPacket& packet) {
   for (std::size_t lane = 0; lane + 1 < kLanes; ++lane) {
     const bool differs = (hit.geomID[lane] != hit.geomID[lane + 1]) | (hit.primID[lane] != hit.primID[lane + 1]);
     // The triangle of a ray that missed is what the lane found before.
-    const bool missed = (hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID) & (hit.geomID[lane + 1] == RTC_INVALID_GEOMETRY_ID);
+    const bool missed =
+        (hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID) & (hit.geomID[lane + 1] == RTC_INVALID_GEOMETRY_ID);
     count += (differs & !missed) ? 1 : 0;
   }
   return count;

@@ -1,7 +1,8 @@
 // Rays that end on the texel cache: a ray stops at the first surface whose texel knows what it reflects. Where a hit
 // has no texel (a surface without lightmap, the back of a single-sided one) it is shaded on the spot: its direct light
-// is sampled and one ray goes on, until it meets a texel. So is the first hit of a ray that is no longer than its texels
-// are wide: in corners and at the feet of things one value for a whole texel would tell its neighbours the wrong light.
+// is sampled and one ray goes on, until it meets a texel. So is the first hit of a ray that is no longer than its
+// texels are wide: in corners and at the feet of things one value for a whole texel would tell its neighbours the wrong
+// light.
 #pragma once
 
 #include <algorithm>

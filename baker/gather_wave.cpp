@@ -29,9 +29,7 @@ struct WarmSink {
     links[flight.lane * GatherWave::kWarmRays + flight.sample] = {texel, packWeight(flight.beta)};
   }
   void prefetch(std::uint32_t) const {}
-  void backFace(const Flight& flight) {
-    texels[flight.lane].backs |= 1u << flight.sample;
-  }
+  void backFace(const Flight& flight) { texels[flight.lane].backs |= 1u << flight.sample; }
 };
 
 }  // namespace
@@ -48,7 +46,7 @@ struct GatherSink {
   MapTotals totals{};
   bool tallied = false;  // whether the gather rays are
   LightTally rays{};
-  std::size_t point = 0;  // the footprint point that rays come from
+  std::size_t point = 0;                                                    // the footprint point that rays come from
   std::array<std::array<std::uint8_t, WavePoints::kMost>, kLanes> backs{};  // rays of a net that met backs, by point
 
   /// Radiance that a texel reflects, by level.
@@ -137,7 +135,8 @@ struct GatherSink {
     const std::uint32_t each = net.count() / WavePoints::kMost;
     for (std::size_t lane = 0; lane < coords.size(); ++lane) {
       if (each >= 2) result.texels[lane].inside.addNet(backs[lane], each);
-      for (std::uint32_t i = net.first; i < std::min(net.first + net.count(), std::uint32_t{GatherWave::kWarmRays}); ++i)
+      for (std::uint32_t i = net.first; i < std::min(net.first + net.count(), std::uint32_t{GatherWave::kWarmRays});
+           ++i)
         result.texels[lane].firstBacks |= std::uint32_t{backs[lane][i - net.first]} << i;
     }
     backs = {};
@@ -404,8 +403,8 @@ void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
   sink.result.shadowRays += tracer.shadowRays();
 }
 
-/// The footprint point of the rays into a cell: any 16 neighbouring cells use all points of a texel, and where a point has
-/// two rays they go to opposite sides.
+/// The footprint point of the rays into a cell: any 16 neighbouring cells use all points of a texel, and where a point
+/// has two rays they go to opposite sides.
 static std::uint32_t pointOf(std::uint32_t cell) { return cell ^ ((cell >> 1) & 8u); }
 
 /// Sends the rays of all lanes into one cell of the net.
@@ -423,8 +422,7 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
   alignas(64) std::array<float, kLanes> beta;
   for (std::size_t lane = 0; lane < kLanes; ++lane) beta[lane] = kInvPi / rays.pdf[lane];
   Vec3Lanes light, sky;
-  if (shines && rays.packet.anyMissed())
-    scene_.transport.environment.arriving(rays.packet.directions(), rays.pdf, sky);
+  if (shines && rays.packet.anyMissed()) scene_.transport.environment.arriving(rays.packet.directions(), rays.pdf, sky);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (!rays.packet.valid[lane]) continue;
     ++sink.result.rays;

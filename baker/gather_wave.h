@@ -48,15 +48,15 @@ struct GatherScene {
   int lastDepth = 0;  // GatherTracer
   CacheLevels levels{};
   bool indirectOnly = false;
-  std::optional<TraceMode> gatherMode{};  // of the texels' rays; else as CoherencePilot says
+  std::optional<TraceMode> gatherMode{};    // of the texels' rays; else as CoherencePilot says
   std::vector<LightStrategy> strategies{};  // of the texels' own light
   std::span<const Vec3> reflectance{};      // of the map's texels, once the warm-up has found it
 };
 
-/// Chooses how the next packet is traced by what those before it hit: where many rays of a packet find the triangle that
-/// their neighbour found they run through the same nodes too, and Embree's coherent traversal takes less time; where
-/// they scatter it takes more. Hits are the same either way, but for which of two surfaces in the same place is found,
-/// and the choice depends on the scene and not on clocks.
+/// Chooses how the next packet is traced by what those before it hit: where many rays of a packet find the triangle
+/// that their neighbour found they run through the same nodes too, and Embree's coherent traversal takes less time;
+/// where they scatter it takes more. Hits are the same either way, but for which of two surfaces in the same place is
+/// found, and the choice depends on the scene and not on clocks.
 class CoherencePilot {
  public:
   explicit CoherencePilot(const RayScene& rays) : allowed_(!rays.placesInstances()) {}

@@ -191,7 +191,8 @@ void LightTree::build(std::span<const LightBounds> lights, std::size_t first, st
   const bool reaches = !(glm::dot(outside, outside) > group.reach * group.reach);
   // From inside of the bounding sphere lights may lie in any direction and shine from any side.
   const bool isOutside = distance2 > group.radius2;
-  const float inside = pick(group.radius2 > 0.0f, kAnySide * group.power / pick(group.radius2 > 0.0f, group.radius2, 1.0f), 0.0f);
+  const float inside =
+      pick(group.radius2 > 0.0f, kAnySide * group.power / pick(group.radius2 > 0.0f, group.radius2, 1.0f), 0.0f);
   const float perDistance2 = 1.0f / pick(isOutside, distance2, 1.0f);
   const Vec3 wi = toCentre * std::sqrt(perDistance2);
   const float sine2 = group.radius2 * perDistance2;
@@ -242,9 +243,9 @@ LUMEL_FOR_EACH_CPU void LightTree::importanceLanes(const GroupLanes& groups, con
                                                    float* importances) {
 #pragma GCC ivdep
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const Group group{groups.centre[lane],    groups.half[lane],      groups.axis[lane],
-                      groups.radius2[lane],   groups.cosSpread[lane], groups.sinSpread[lane],
-                      groups.cosEmit[lane],   groups.power[lane],     groups.reach[lane]};
+    const Group group{groups.centre[lane],  groups.half[lane],      groups.axis[lane],
+                      groups.radius2[lane], groups.cosSpread[lane], groups.sinSpread[lane],
+                      groups.cosEmit[lane], groups.power[lane],     groups.reach[lane]};
     importances[lane] = importanceOf(group, {p[lane], n[lane]});
   }
 }

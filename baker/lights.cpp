@@ -254,8 +254,8 @@ void PunctualLights::choose(std::size_t first, const ReceiverLanes& at, const Un
 }
 
 /// Among lights [first, end) and, if it has any importance, the tree.
-LightTree::Choice PunctualLights::chooseAmong(std::size_t first, std::size_t end, float treeImportance,
-                                              const Vec3& p, const Vec3& n, float u) const {
+LightTree::Choice PunctualLights::chooseAmong(std::size_t first, std::size_t end, float treeImportance, const Vec3& p,
+                                              const Vec3& n, float u) const {
   std::array<float, kLocalLights> few;
   std::vector<float> many;  // more directional lights than that are possible, if unlikely
   if (end - first > few.size()) many.resize(end - first);

@@ -240,8 +240,8 @@ Expected<void> checkPlaces(const SsbumpArguments& a) {
     return usageError("-o FILE is missing: where the ssbump map goes (or --study DIR, --contact-sheet FILE)");
   const std::array inputs{a.input, a.normalMap, a.low, fs::path(a.basis), a.albedo, a.mask, a.detail, a.crossFade};
   const MapFiles& save = a.save;
-  for (const fs::path& place : {a.output, save.weights, save.occlusion, save.ambient, save.normal, save.recovered,
-                                a.contactSheet})
+  for (const fs::path& place :
+       {a.output, save.weights, save.occlusion, save.ambient, save.normal, save.recovered, a.contactSheet})
     if (auto apart = checkNoInput(place, inputs); !apart) return apart;
   if (!a.study.empty())
     if (auto writable = checkWritable(a.study); !writable) return writable;
@@ -304,7 +304,8 @@ void declareOcclusion(OptionTable& o, SsbumpArguments& a) {
   o.group("Occlusion");
   o.choice("method", a.method, {"horizon", "rays"},
            "horizon: exact horizons, noise-free; rays: Embree, for checks (meshes always use rays)");
-  o.integer("azimuths", a.azimuths, {0, 1024}, "Slices of the horizon method; 0: 48 for heights that span up to 32 texels, else 64");
+  o.integer("azimuths", a.azimuths, {0, 1024},
+            "Slices of the horizon method; 0: 48 for heights that span up to 32 texels, else 64");
   o.integer("rays", a.rays, {1, 1 << 20}, "Rays per texel");
   o.choice("sampling", a.sampling, {"random", "stratified", "sobol"}, "How rays are spread");
   o.integer("seed", a.seed, "Seed of the rays");

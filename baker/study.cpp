@@ -84,8 +84,8 @@ struct Maps {
 
 using Mask = std::vector<std::vector<std::uint8_t>>;
 
-/// Texels that path tracing and the gather mean the same by: where part of one is inside of something path tracing counts
-/// that part.
+/// Texels that path tracing and the gather mean the same by: where part of one is inside of something path tracing
+/// counts that part.
 Mask validTexels(const std::vector<BakedPage>& pages) {
   constexpr float kLeastValidity = 0.99f;
   Mask mask;

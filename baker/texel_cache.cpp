@@ -194,7 +194,8 @@ void TexelMap::findPixels(const RayPacket& packet, Lookup& lookup) const {
     const Triangle& triangle = triangles_[lookup.triangles[lane]];
     const PageMap& page = pages_[triangle.page];
     const bool isFound = lookup.triangles[lane] != kNowhere;
-    const Vec2 place = triangle.at(pick(isFound, packet.rayhit.hit.u[lane], 0.0f), pick(isFound, packet.rayhit.hit.v[lane], 0.0f));
+    const Vec2 place =
+        triangle.at(pick(isFound, packet.rayhit.hit.u[lane], 0.0f), pick(isFound, packet.rayhit.hit.v[lane], 0.0f));
     // Rounding may lead over the page's border.
     const auto x = static_cast<std::uint32_t>(std::clamp(static_cast<int>(place.x), 0, page.width - 1));
     const auto y = static_cast<std::uint32_t>(std::clamp(static_cast<int>(place.y), 0, page.height - 1));
@@ -250,7 +251,8 @@ std::uint32_t TexelMap::nearestValid(std::size_t pageIndex, std::size_t texel,
 std::vector<std::uint8_t> TexelMap::tilesWith(std::span<const std::uint8_t> valid) const {
   std::vector<std::uint8_t> tiles(tiles_.size(), 0);
   for (std::size_t i = 0; i < tiles_.size(); ++i)
-    for (std::uint32_t t = tiles_[i].first; t < tiles_[i].first + countBits(tiles_[i].covered); ++t) tiles[i] |= valid[t];
+    for (std::uint32_t t = tiles_[i].first; t < tiles_[i].first + countBits(tiles_[i].covered); ++t)
+      tiles[i] |= valid[t];
   return tiles;
 }
 

@@ -78,8 +78,8 @@ class TexelMap {
     std::uint32_t firstTile = 0;
     std::uint32_t tilesAcross = 0;
   };
-  /// 4 x 4 pixels. Texels are numbered tile by tile (PageTexels::coords), so a texel is the first of its tile and as many
-  /// more as are covered before it: the map of a page fits into a processor's cache.
+  /// 4 x 4 pixels. Texels are numbered tile by tile (PageTexels::coords), so a texel is the first of its tile and as
+  /// many more as are covered before it: the map of a page fits into a processor's cache.
   struct Tile {
     std::uint32_t first = 0;
     std::uint32_t covered = 0;  // bit 4 * (y % 4) + x % 4

@@ -48,7 +48,8 @@ double smallestEigenvalue(const std::array<double, 6>& m) {
 
 class Grower {
  public:
-  Grower(const HalfEdgeMesh& mesh, const GrowOptions& options) : mesh_(mesh), options_(options), place_(mesh.size(), kSingle), borders_(mesh.size(), 3 * mesh.size() / 2) {}
+  Grower(const HalfEdgeMesh& mesh, const GrowOptions& options)
+      : mesh_(mesh), options_(options), place_(mesh.size(), kSingle), borders_(mesh.size(), 3 * mesh.size() / 2) {}
 
   MergeTree grow() {
     tree_.triangleCount = mesh_.size();

@@ -261,8 +261,8 @@ std::vector<double> lightOfCharts(const Image& flat, std::span<const std::uint32
   return light;
 }
 
-/// Gives every chart back the light that averaging took where it curves, in proportion to what its texels hold: shared by
-/// their noise, a texel that is dark but for one map would gain many times what that map holds.
+/// Gives every chart back the light that averaging took where it curves, in proportion to what its texels hold: shared
+/// by their noise, a texel that is dark but for one map would gain many times what that map holds.
 void restoreLight(const std::array<Image*, kMaps>& maps, std::span<const std::uint32_t> chartIds,
                   const std::vector<double>& before) {
   std::vector<double> gain = lightOfCharts(*maps[0], chartIds);

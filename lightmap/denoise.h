@@ -15,13 +15,11 @@ namespace lumel {
 inline constexpr int kDenoiseRadius = 5;
 
 /// `flat` and `rnm`: RGB images of one size. Per texel, row by row: `chartIds`, 0 where a texel is neither read nor
-/// changed; the standard error of the flat map's luminance, `stride` floats apart. All four maps of a texel are averaged
-/// with the same weights, so what holds for them linearly (the mean of the three maps is the flat one) goes on to hold. A
-/// texel without noise keeps its value among texels that differ from it, but for one factor to all texels and maps of a
-/// chart, by which the chart keeps its flat map's mean luminance. Values that are not finite spread no further than the
-/// texel.
-/// Parallel and deterministic.
-/// Memory: 4.5 KiB per texel of the page's width.
+/// changed; the standard error of the flat map's luminance, `stride` floats apart. All four maps of a texel are
+/// averaged with the same weights, so what holds for them linearly (the mean of the three maps is the flat one) goes on
+/// to hold. A texel without noise keeps its value among texels that differ from it, but for one factor to all texels
+/// and maps of a chart, by which the chart keeps its flat map's mean luminance. Values that are not finite spread no
+/// further than the texel. Parallel and deterministic. Memory: 4.5 KiB per texel of the page's width.
 void denoise(Image& flat, std::array<Image, 3>& rnm, std::span<const std::uint32_t> chartIds,
              std::span<const float> standardError, std::size_t stride = 1);
 

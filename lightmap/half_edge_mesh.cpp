@@ -52,9 +52,7 @@ class Builder {
   }
 
   /// Corners are those of kept triangles.
-  std::uint32_t vertexAt(std::uint32_t corner) const {
-    return soup_.indices[corner];
-  }
+  std::uint32_t vertexAt(std::uint32_t corner) const { return soup_.indices[corner]; }
   std::uint32_t pointAt(std::uint32_t corner) const { return welded_[vertexAt(corner)]; }
 
   void keepTriangles() {

@@ -15,7 +15,8 @@ namespace lumel {
 inline constexpr double kTexelSnap = 1.0 / 1024;
 
 inline double snapToTexelBorder(double x) {
-  constexpr double kNoFraction = 6755399441055744.0;  // 1.5 * 2^52: so large that sums are whole; std::round would be a call
+  constexpr double kNoFraction =
+      6755399441055744.0;  // 1.5 * 2^52: so large that sums are whole; std::round would be a call
   const double nearest = (x + kNoFraction) - kNoFraction;
   return std::abs(x - nearest) <= kTexelSnap ? nearest : x;
 }

@@ -140,7 +140,8 @@ bool SparseCholesky::eliminate(std::uint32_t index, const std::function<std::arr
     store(front, matrix.data());
   }
   updates[index].reserve(front.rows * (front.rows + std::size_t{1}) / 2);
-  for (Eigen::Index j = pivots; j < size; ++j) updates[index].insert(updates[index].end(), &matrix(j, j), &matrix(0, j) + size);
+  for (Eigen::Index j = pivots; j < size; ++j)
+    updates[index].insert(updates[index].end(), &matrix(j, j), &matrix(0, j) + size);
   return true;
 }
 
@@ -170,7 +171,9 @@ bool SparseCholesky::factorize(const std::function<std::array<double, 3>(std::si
   };
   // Subtrees small enough are independent tasks. What joins some of them comes right after these, before what they pass
   // on is more than all that is kept.
-  const auto isTask = [&](std::uint32_t i) { return fronts_[i].end - fronts_[i + 1 - fronts_[i].subtree].begin <= kTaskPoints; };
+  const auto isTask = [&](std::uint32_t i) {
+    return fronts_[i].end - fronts_[i + 1 - fronts_[i].subtree].begin <= kTaskPoints;
+  };
   std::vector<std::uint32_t> parts, tasks, joints;
   for (auto i = static_cast<std::uint32_t>(fronts_.size()); i-- > 0;) {
     parts.push_back(i);

@@ -10,9 +10,9 @@
 
 namespace lumel {
 
-/// L L^T of the matrix sum over triangle sides (i, j) of w (e_i - e_j)(e_i - e_j)^T, with one point held by a weight of 1.
-/// The factor is kept in 16 bits an entry, in steps of each column's own. So a solution is good to two
-/// or three digits; who wants more solves for what is still missing.
+/// L L^T of the matrix sum over triangle sides (i, j) of w (e_i - e_j)(e_i - e_j)^T, with one point held by a weight
+/// of 1. The factor is kept in 16 bits an entry, in steps of each column's own. So a solution is good to two or three
+/// digits; who wants more solves for what is still missing.
 class SparseCholesky {
  public:
   /// The triangles must outlive it.
@@ -51,7 +51,7 @@ class SparseCholesky {
   std::vector<std::uint32_t> rank_;   // per point
   std::vector<Front> fronts_;         // children before parents
   std::vector<std::uint32_t> rows_;
-  std::vector<float> step_;           // per rank, of its column
+  std::vector<float> step_;  // per rank, of its column
   std::unique_ptr<std::int16_t[]> values_;
 };
 

@@ -8,7 +8,8 @@ namespace {
 
 using namespace testing_scene;
 
-/// A floor of 4 x 4 texels of 1 m under an even sky, black like all that stands on it: light is what of the sky is seen.
+/// A floor of 4 x 4 texels of 1 m under an even sky, black like all that stands on it: light is what of the sky is
+/// seen.
 TestScene blackFloor() {
   TestScene test;
   test.integrator = Integrator::Gather;
@@ -57,7 +58,8 @@ TEST(Inside, TheOpenPartOfATexelIsAsBrightAsTheFloorBesideIt) {
     for (const int samples : {32, 64, 100, 256, 1024}) {
       double light = 0, validity = 0;
       for (int seed = 1; seed <= kSeeds; ++seed) {
-        const BakeResult result = test.bake({.samples = samples, .bounces = 1, .seed = static_cast<std::uint64_t>(seed)});
+        const BakeResult result =
+            test.bake({.samples = samples, .bounces = 1, .seed = static_cast<std::uint64_t>(seed)});
         light += columns(result, 1, 2).light / kSeeds;
         validity += columns(result, 1, 2).validity / kSeeds;
       }

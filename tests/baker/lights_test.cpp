@@ -166,10 +166,12 @@ TEST(EnvironmentLight, CellsKeepTheLightOfAnyImage) {
     sky.image = Image(width, std::max(1, width / 2), 3);
     for (int y = 0; y < sky.image.height; ++y)
       for (int x = 0; x < width; ++x)
-        sky.image.setRgb(x, y, Vec3(unitFloat(hashCombine(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)))));
+        sky.image.setRgb(x, y,
+                         Vec3(unitFloat(hashCombine(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)))));
     sky.strength = 3.0f;
     const EnvironmentLight light(sky);
-    const double found = (light.skySampled() ? sampled(light, false) : 0.0) + (light.sunSampled() ? sampled(light, true) : 0.0);
+    const double found =
+        (light.skySampled() ? sampled(light, false) : 0.0) + (light.sunSampled() ? sampled(light, true) : 0.0);
     EXPECT_NEAR(found / integrate(sky, light).light, 1.0, 3e-3) << width;
     if (width > 100) continue;
     // Less than half a cell beside a place a bilinear interpolant of values below 3 differs by 3 / (pixels per cell).
@@ -253,7 +255,8 @@ TEST(PunctualLights, LanesGiveWhatSinglePointsDo) {
         LightSampleLanes samples;
         near ? lights.sampleNear(at, u, samples) : lights.sample(at, u, samples);
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
-          const LightSample one = near ? lights.sampleNear(p[lane], n[lane], u.u[lane]) : lights.sample(p[lane], n[lane], u.u[lane]);
+          const LightSample one =
+              near ? lights.sampleNear(p[lane], n[lane], u.u[lane]) : lights.sample(p[lane], n[lane], u.u[lane]);
           EXPECT_EQ(samples.weight[lane], one.weight);
           if (one.weight == Vec3(0.0f)) continue;
           EXPECT_EQ(samples.wi[lane], one.wi);

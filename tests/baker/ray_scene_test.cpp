@@ -342,7 +342,8 @@ TEST(CoherencePilot, CoherentWhereRaysFindTheSameTriangles) {
   TestScene many;
   for (int i = 0; i < 40; ++i)
     for (int k = 0; k < 40; ++k)
-      many.addRectangle({0.25f * static_cast<float>(i) - 5, 1, 0.25f * static_cast<float>(k) - 5}, {0.25f, 0, 0}, {0, 0, 0.25f});
+      many.addRectangle({0.25f * static_cast<float>(i) - 5, 1, 0.25f * static_cast<float>(k) - 5}, {0.25f, 0, 0},
+                        {0, 0, 0.25f});
   const Built tiles(many.scene);
   for (std::uint32_t i = 0; i < 8; ++i) {
     AimedRays rays = aimed({0, 0, 0}, 0.9f, i);

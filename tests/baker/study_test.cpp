@@ -76,8 +76,8 @@ TEST(Study, TheReferenceKnowsItsError) {
   EXPECT_GT(study.reference.flatError, path.back()->flat.rmse / 32.0);
   EXPECT_GT(study.reference.rnmError, study.reference.flatError);
   // Noise that all texels share through the gather's cache shows as a bias of the mean. It falls with the number of
-  // texels: +0.3% with 64 samples where lumel_bench_gather has 7.5 thousand, and -0.8, -0.1 and -0.2% with three seeds in
-  // this room of 770. The bound is four such deviations.
+  // texels: +0.3% with 64 samples where lumel_bench_gather has 7.5 thousand, and -0.8, -0.1 and -0.2% with three seeds
+  // in this room of 770. The bound is four such deviations.
   for (const StudyPoint& p : study.points)
     if (p.hasMaps && p.series != "denoised" && p.samples == 64) {
       EXPECT_LT(std::abs(p.flat.bias), 0.02) << p.series;

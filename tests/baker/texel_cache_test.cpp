@@ -64,7 +64,8 @@ TEST(TexelMap, FindsTheTexelUnderAHit) {
         const float x = packet.rayhit.ray.org_x[lane], z = packet.rayhit.ray.org_z[lane];
         const std::size_t page = x < 15 ? 0 : 1;
         const float side = page == 0 ? 10.0f : 7.0f, along = page == 0 ? x : x - 20.0f;
-        const float edge = std::min({std::abs(z - std::round(z)), std::abs(along - std::round(along)), std::abs(along - z)});
+        const float edge =
+            std::min({std::abs(z - std::round(z)), std::abs(along - std::round(along)), std::abs(along - z)});
         if (edge < 1e-3f) continue;  // rounding decides
         const bool lies = x < 30 && (page == 0 || z > along) && lane % 4 != 3;
         if (lies) expected = mapped.texelAt(page, static_cast<int>(z), static_cast<int>(side - along));

@@ -210,8 +210,8 @@ double median(std::vector<double> values) {
 }
 
 /// Naive loop and gather in turns over the same waves; medians over rounds.
-void compare(benchmark::State& state, int place, std::uint32_t samples, std::optional<TraceMode> mode, std::size_t waves,
-             int rounds) {
+void compare(benchmark::State& state, int place, std::uint32_t samples, std::optional<TraceMode> mode,
+             std::size_t waves, int rounds) {
   const Fixture& f = fixture(place);
   GatherScene scene = f.scene;
   scene.gatherMode = mode;
@@ -254,8 +254,8 @@ void compare(benchmark::State& state, int place, std::uint32_t samples, std::opt
 }
 
 void speedup(benchmark::State& state) {
-  compare(state, static_cast<int>(state.range(0)), static_cast<std::uint32_t>(state.range(1)),
-          modeOf(state.range(2)), 64, 5);
+  compare(state, static_cast<int>(state.range(0)), static_cast<std::uint32_t>(state.range(1)), modeOf(state.range(2)),
+          64, 5);
 }
 BENCHMARK(speedup)
     ->ArgNames({"foliage", "rays", "coherent"})
@@ -278,10 +278,14 @@ void gather(benchmark::State& state) {
 }
 BENCHMARK(gather)->ArgNames({"foliage", "rays"})->ArgsProduct({{Rooms, Foliage}, {16, 64, 256}})->Unit(benchmark::kMillisecond);
 
-void smoke(benchmark::State& state) {
-  compare(state, Rooms, 16, modeOf(state.range(0)), 2, 1);
-}
-BENCHMARK(smoke)->ArgName("coherent")->Arg(kNever)->Arg(kAlways)->Arg(kByPilot)->Iterations(1)->Unit(benchmark::kMillisecond);
+void smoke(benchmark::State& state) { compare(state, Rooms, 16, modeOf(state.range(0)), 2, 1); }
+BENCHMARK(smoke)
+    ->ArgName("coherent")
+    ->Arg(kNever)
+    ->Arg(kAlways)
+    ->Arg(kByPilot)
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace lumel
