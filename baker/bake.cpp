@@ -179,6 +179,7 @@ Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const R
                                     .indirectOnly = options.indirectOnly,
                                     .seed = options.seed,
                                     .targetError = options.targetError,
+                                    .adaptive = options.adaptive,
                                     .timeBudgetSeconds = static_cast<double>(options.timeBudgetSeconds)};
   std::optional<GatherIntegrator> integrator(std::in_place, transport, kernels, atlas, texels, gatherOptions);
   if (auto done = integrator->run(progress); !done) return done.error();

@@ -26,10 +26,13 @@ inline constexpr int kAllBounces = -1;
 
 struct BakeOptions {
   Integrator integrator = Integrator::Gather;
-  int samples =
-      256;  // gather rays per texel, any count >= 1; with a target error the least, with a time budget the most
+  // Gather rays per texel, any count >= 1; with a target error the least, with a time budget or `adaptive` the most.
+  int samples = 256;
+  // Gather alone: no more samples, after 32, where the error of the worst map is too small to be seen beside that of
+  // texels that take all.
+  bool adaptive = true;
   int bounces = kAllBounces;  // indirect bounces; 0 = direct light only
-  // Gather alone: sampling goes on until the relative standard error of the flat map is so small at 95% of the texels,
+  // Gather alone: sampling goes on until the relative standard error of the worst map is so small at 95% of the texels,
   // or `maxSamples` are taken; texels darker than a tenth of the mean are judged as if they were so bright. 0: off.
   float targetError = 0.0f;
   int maxSamples = 16384;

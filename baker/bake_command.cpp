@@ -49,8 +49,11 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
   options.choice("integrator", a.bake.integrator, {"gather", "path"},
                  "Light from other texels (gather), or every path to its end: unbiased and slow (path)");
   options.choice("quality", a.quality, {"draft", "preview", "production"}, "16, 64 or 256 samples");
-  options.integer("samples", a.samples, {1, 1 << 24}, "Gather rays per texel; with --target-error the least")
+  options.integer("samples", a.samples, {1, 1 << 24}, "Gather rays per texel, at most; with --target-error the least")
       .defaultText = "by --quality; 32 with --target-error";
+  options.choice("adaptive", a.bake.adaptive, {"off", "on"},
+                 "After 32 samples leave out texels whose error is too small to be seen beside that of others; off: "
+                 "the same number everywhere");
   options.share("target-error", a.bake.targetError, {0.0f, 1.0f},
                  "Sample each part of a page until the relative standard error of its light is so small (1% or 0.01); "
                  "done when 95% of the texels are. Texels darker than a tenth of the mean count as so bright. 0: off, "

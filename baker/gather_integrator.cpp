@@ -18,6 +18,13 @@ constexpr std::uint32_t kFirstJudged = 32;
 /// A wave that meets the target goes on with more than so many of the eight around it that do not (a straight border
 /// has three): estimates scatter, and waves that stop by themselves would show as streaks in the sample counts.
 constexpr std::ptrdiff_t kMostUnmetAround = 3;
+/// Without a target a texel is done at kSettledError * N^kSettledRate times the root of its light and the mean light, N
+/// being all samples: what is seen of an error goes with the root of the light, and a texel of mean light has about
+/// this error after N samples.
+constexpr double kSettledError = 0.4;
+constexpr double kSettledRate = -0.6;
+/// Texels darker than this share of the mean are judged as if they were so bright.
+constexpr double kSettledFloor = 0.02;
 /// Calibrated: 93 to 97% of texels lie within 1.96 standard errors.
 constexpr double kGatherCredit = 0.5;
 /// Endless light: the warm-up ends where another bounce adds less than this share, or after so many.
@@ -35,6 +42,8 @@ constexpr double kCertain = 8.0;
 constexpr float kMostInside = 0.6f;
 /// Inside of something whose chart nobody sees texels darker than this share of the mean need no more samples.
 constexpr double kDarkInside = 0.01;
+
+float square(float x) { return x * x; }
 
 CacheLevels levelsFor(int bounces) {
   if (bounces < 0) return {.count = 1, .base = 0, .endless = true};
@@ -177,7 +186,11 @@ Expected<void> GatherIntegrator::run(Progress& progress) {
     if (auto done = pass(first, end, progress); !done) return done;
     secondsPerSample = (elapsed() - began) / (end - first);
     first = end;
-    if (options_.targetError > 0.0f && end >= std::max(kFirstJudged, least) && markDone() >= kTargetShare) break;
+    if (options_.targetError > 0.0f) {
+      if (end >= std::max(kFirstJudged, least) && markDone() >= kTargetShare) break;
+    } else if (options_.adaptive && end >= kFirstJudged && end < samples) {
+      markDone();
+    }
     if (scene_.levels.count > 0 && first < samples) renewCache();
   }
   dropCache();
@@ -279,7 +292,11 @@ void GatherIntegrator::solveLinks(const WarmLinks& links, std::vector<Vec3> ligh
 Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Progress& progress) {
   auto traced = forEachWave(progress, [&](std::size_t w) {
     const Wave& wave = waves_[w];
-    if (wave.done) return GatheredWave{};
+    const std::uint64_t samples = std::uint64_t{wave.count} * (end - first);
+    if (wave.done) {
+      progress.advance(samples);
+      return GatheredWave{};
+    }
     const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
     const std::span buried = std::span(buried_).subspan(start, wave.count);
     GatheredWave done;
@@ -289,7 +306,7 @@ Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Pr
       for (std::size_t i = 0; i < wave.count; ++i) coverage_[start + i] = texels.coverage(i);
     }
     store(w, done, first, end);
-    progress.advance(std::uint64_t{wave.count} * (end - first));
+    progress.advance(samples);
     return done;
   });
   if (!traced) return traced;
@@ -300,7 +317,8 @@ Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Pr
 }
 
 void GatherIntegrator::store(std::size_t index, const GatheredWave& done, std::uint32_t first, std::uint32_t end) {
-  const Wave& wave = waves_[index];
+  Wave& wave = waves_[index];
+  wave.moved = {};
   std::array<float, kLanes> before{};
   std::array<float, kLanes> now{};
   std::uint32_t leftOut = 0;
@@ -317,7 +335,13 @@ void GatherIntegrator::store(std::size_t index, const GatheredWave& done, std::u
     flat += Vec3(texel.flat);
     if (!seen_.empty()) seen_[start + i] += Vec3(texel.seen);
     now[i] = luminance(flat) / static_cast<float>(end);
-    for (std::size_t k = 0; k < 3; ++k) sums_.rnm[k][start + i] += Vec3(texel.rnm[k]);
+    wave.moved[0] += square(now[i] - before[i]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      Vec3& sum = sums_.rnm[k][start + i];
+      const float mean = luminance(sum) / static_cast<float>(std::max(1u, first));
+      sum += Vec3(texel.rnm[k]);
+      wave.moved[k + 1] += square(luminance(sum) / static_cast<float>(end) - mean);
+    }
     if (!scene_.levels.endless)
       for (std::size_t l = 0; l < stored(); ++l) levelSums_[(start + i) * stored() + l] += Vec3(texel.levels[l]);
     backFaces_[start + i] += texel.backFaces;
@@ -399,21 +423,34 @@ float GatherIntegrator::errorOf(std::size_t wave, std::size_t i) const {
   return errors_->standardError(wave, i) * static_cast<float>(samplesOf_[t]) / weightOf(t);
 }
 
+double GatherIntegrator::worstByFlat(std::size_t wave) const {
+  std::array<double, 4> moved{};
+  for (const std::uint32_t near : errors_->around(wave))
+    if (near != DoublingError::kNone)
+      for (std::size_t map = 0; map < moved.size(); ++map) moved[map] += static_cast<double>(waves_[near].moved[map]);
+  return moved[0] > 0.0 ? std::sqrt(std::ranges::max(moved) / moved[0]) : 1.0;
+}
+
 double GatherIntegrator::markDone() {
   const std::size_t count = map_.size();
-  const double floor = darkFloor(kDarkFloor);
+  const double mean = darkFloor(1.0);
+  const double settled = kSettledError * std::pow(static_cast<double>(options_.samples), kSettledRate);
+  const auto goal = [&](double light) {
+    return options_.targetError > 0.0f ? static_cast<double>(options_.targetError) * std::max(light, kDarkFloor * mean)
+                                       : settled * std::sqrt(std::max(light, kSettledFloor * mean) * mean);
+  };
   std::size_t met = 0;
   std::vector<std::uint8_t> meets(waves_.size());
   for (std::size_t w = 0; w < waves_.size(); ++w) {
     const Wave& wave = waves_[w];
     const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
+    const double worst = worstByFlat(w);
     std::size_t metHere = 0;
     for (std::size_t i = 0; i < wave.count; ++i) {
       const std::size_t t = start + i;
-      const auto light = static_cast<double>(luminance(meanLight(t)));
-      const bool inside = 2 * backFaces_[t] > samplesOf_[t];
-      metHere += inside || static_cast<double>(errorOf(w, i)) <=
-                               static_cast<double>(options_.targetError) * std::max(light, floor);
+      const bool inside = options_.targetError > 0.0f && 2 * backFaces_[t] > samplesOf_[t];
+      metHere +=
+          inside || worst * static_cast<double>(errorOf(w, i)) <= goal(static_cast<double>(luminance(meanLight(t))));
     }
     meets[w] = wave.done || metHere == wave.count;
     met += metHere;

@@ -23,6 +23,7 @@ struct GatherOptions {
   bool indirectOnly = false;
   std::uint64_t seed = 1;
   float targetError = 0.0f;        // relative standard error at which a wave of texels is done; 0: none
+  bool adaptive = false;           // without a target: a wave is done where more samples would not be seen
   double timeBudgetSeconds = 0.0;  // no pass is begun that would probably end later; 0: none
 };
 
@@ -79,8 +80,10 @@ struct WarmLinks {
 /// chart has none, those that stay dark are not. Of other texels the parts that are inside do not count: the mean is
 /// over samples from footprint points in the open.
 ///
-/// Errors: DoublingError. With a target a wave of texels is done when each of its texels meets it; texels inside of
-/// something (validity under one half) are not judged.
+/// Errors: DoublingError, for the flat map; those of the worst map follow by how much farther it moved around the wave.
+/// A wave of texels is done when each of its texels' worst map is as good as its goal: the target, or an error that
+/// nobody sees beside that of others. By the target, texels inside of something (validity under one half) are not
+/// judged.
 class GatherIntegrator {
  public:
   /// Keeps references to its arguments.
@@ -105,7 +108,9 @@ class GatherIntegrator {
     std::uint32_t page = 0;
     std::uint32_t first = 0;  // texel of the page
     std::uint32_t count = 0;
-    bool done = false;  // the target error is met
+    bool done = false;  // as good as its goal
+    // For the flat map and the others: sum over texels of the square of how far their means moved in the last pass.
+    std::array<float, 4> moved{};
   };
   Expected<void> warmUp(Progress& progress);
   /// `light`: irradiance / pi to begin with; `constant`: what every sweep finds again, links apart.
@@ -132,7 +137,9 @@ class GatherIntegrator {
     return firstProbe_[page] + index / PathIntegrator::kProbeStride;
   }
   void estimateErrors();
-  /// Marks waves that meet the target. Returns the share of texels that do.
+  /// Error of the worst map by that of the flat one, around a wave.
+  double worstByFlat(std::size_t wave) const;
+  /// Marks waves that are as good as their goal. Returns the share of texels that are.
   double markDone();
   template <class Body>
   Expected<void> forEachWave(Progress& progress, Body body);

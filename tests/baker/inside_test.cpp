@@ -121,7 +121,7 @@ TEST(Inside, AnInsideOutRoomIsLit) {
   lamp.position = {2, 2, 2};
   lamp.intensity = 10.0f;
   test.scene.lights = {lamp};
-  const Floor floor = columns(test.bake({.samples = 128, .bounces = 1}), 0, 4);
+  const Floor floor = columns(test.bake({.samples = 128, .adaptive = false, .bounces = 1}), 0, 4);
   EXPECT_EQ(floor.validity, 0.0);
   EXPECT_EQ(floor.samples, 128);
   double expected = 0;

@@ -32,7 +32,7 @@ TEST(Bake, FurnaceThroughTheFilesWithSceneUvs) {
   gltf["materials"][0]["emissiveFactor"] = {1.0, 1.0, 1.0};
   writeFile(dir / "furnace.gltf", gltf.dump());
   const Outcome outcome = run({"bake", dir / "furnace.gltf", "-o", dir / "out", "--uv", "scene", "--page-size", "48",
-                               "--bounces", "3", "--samples", "64", "--dilate", "0"});
+                               "--bounces", "3", "--samples", "64", "--adaptive", "off", "--dilate", "0"});
   ASSERT_EQ(outcome.exitCode, 0) << outcome.err;
   const Image flat = readPixels(dir / "out" / "lightmap-0-flat.exr");
   const auto aux = readImage(dir / "out" / "lightmap-0-aux.exr");
