@@ -31,6 +31,7 @@ struct Hit {
   const Shape* shape = nullptr;
   std::array<std::uint32_t, 3> vertices{};
   Vec3 weights{0, 0, 0};
+  float width = 0.0f;  // of the part of the surface that the ray stands for, in metres; 0: a point
 };
 
 template <class T>
@@ -43,6 +44,18 @@ Vec2 uvAt(const Hit& hit, int set) {
   const auto& sets = hit.shape->primitive->uvSets;
   if (toSize(set) >= sets.size() || sets[toSize(set)].empty()) return {0, 0};
   return interpolate(hit, sets[toSize(set)]);
+}
+
+/// How wide `hit.width` is in a set's coordinates: a ratio of areas, so the mean of a surface's two directions.
+float uvWidthAt(const Hit& hit, int set) {
+  const auto& sets = hit.shape->primitive->uvSets;
+  if (hit.width <= 0.0f || toSize(set) >= sets.size() || sets[toSize(set)].empty()) return 0.0f;
+  const auto& [a, b, c] = hit.vertices;
+  const auto& p = hit.shape->positions;
+  const auto& uv = sets[toSize(set)];
+  const float area = glm::length(glm::cross(p[b] - p[a], p[c] - p[a]));
+  const Vec2 u = uv[b] - uv[a], v = uv[c] - uv[a];
+  return area > 0.0f ? hit.width * std::sqrt(std::abs(u.x * v.y - u.y * v.x) / area) : 0.0f;
 }
 
 /// Bilinear lookup as a graphics card does it: texel centres at half integers, the border repeated.
@@ -71,16 +84,24 @@ struct RayContext {
   bool seesAll = false;        // nothing is culled or cut out
 };
 
-Vec3 rayDirection(const Camera& camera, float x, float y, float aspect, Vec3& origin) {
+/// A ray and how wide the cone about it is (Amanatides 1984): `width` at its origin, and `spread` more per metre.
+struct ViewRay {
+  Vec3 origin;
+  Vec3 direction;
+  float width = 0.0f;
+  float spread = 0.0f;
+};
+
+/// Through (x, y) in -1..1, y up, of a picture; it stands for a square `side` wide, where the picture is 2 high.
+ViewRay viewRay(const Camera& camera, float x, float y, float aspect, float side) {
   const Mat3 turn(glm::normalize(Vec3(camera.worldFromCamera[0])), glm::normalize(Vec3(camera.worldFromCamera[1])),
                   glm::normalize(Vec3(camera.worldFromCamera[2])));
-  origin = Vec3(camera.worldFromCamera[3]);
-  if (camera.orthographic) {
-    origin += turn * Vec3(x * aspect * camera.yExtent, y * camera.yExtent, 0.0f);
-    return turn * Vec3(0, 0, -1);
-  }
+  const Vec3 origin(camera.worldFromCamera[3]);
+  if (camera.orthographic)
+    return {origin + turn * Vec3(x * aspect * camera.yExtent, y * camera.yExtent, 0.0f), turn * Vec3(0, 0, -1),
+            side * camera.yExtent, 0.0f};
   const float tangent = std::tan(0.5f * camera.yFov);
-  return glm::normalize(turn * Vec3(x * aspect * tangent, y * tangent, -1.0f));
+  return {origin, glm::normalize(turn * Vec3(x * aspect * tangent, y * tangent, -1.0f)), 0.0f, side * tangent};
 }
 
 /// Point i of the R2 sequence (Roberts 2018): even coverage of the pixel for any number of points.
@@ -98,7 +119,7 @@ struct Compositor::Impl {
 
   const BakedScene& baked;
   std::vector<Shape> shapes;  // by Embree's geometry number
-  std::map<std::pair<int, ColorSpace>, Texture> textures;
+  std::map<std::pair<int, ColorSpace>, TexturePyramid> textures;
   std::vector<std::string> warnings;
   Vec3 least{0, 0, 0};
   Vec3 most{0, 0, 0};
@@ -112,7 +133,8 @@ struct Compositor::Impl {
   Vec4 sample(const TextureRef& ref, ColorSpace space, const Hit& hit, const Vec4& otherwise) const {
     if (!ref) return otherwise;
     const auto found = textures.find({ref.image, space});
-    return found == textures.end() ? otherwise : found->second.sample(ref, uvAt(hit, ref.uvSet));
+    return found == textures.end() ? otherwise
+                                   : found->second.sample(ref, uvAt(hit, ref.uvSet), uvWidthAt(hit, ref.uvSet));
   }
   Vec4 baseColor(const Hit& hit) const {
     const Material& m = *hit.shape->material;
@@ -134,7 +156,7 @@ struct Compositor::Impl {
   Vec3 worldNormal(const Hit& hit) const;
   Vec3 light(const Hit& hit) const;
   Vec3 shade(const Hit& hit, const Vec4& base, RenderMode mode) const;
-  Vec3 radiance(const Vec3& origin, const Vec3& direction, RenderMode mode, float& lit, Sighting* sighting) const;
+  Vec3 radiance(const ViewRay& ray, RenderMode mode, float& lit, Sighting* sighting) const;
 
   static void filter(const RTCFilterFunctionNArguments* arguments);
 };
@@ -178,11 +200,15 @@ void Compositor::Impl::decodeTextures() {
     want(m.normalMap, ColorSpace::Linear);
     if (m.emission != Vec3(0.0f)) want(m.emissionMap, ColorSpace::Srgb);
   }
-  std::vector<std::optional<Expected<Texture>>> decoded(wanted.size());
+  std::vector<std::optional<Expected<TexturePyramid>>> decoded(wanted.size());
   parallelFor(wanted.size(), 1, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       const ImageSource& source = baked.scene.images[toSize(wanted[i].first)];
-      if (!source.encoded.empty()) decoded[i] = Texture::decode(source, wanted[i].second);
+      if (source.encoded.empty()) continue;
+      if (auto texture = Texture::decode(source, wanted[i].second); !texture)
+        decoded[i] = texture.error();
+      else
+        decoded[i] = TexturePyramid(std::move(*texture));
     }
   });
   for (std::size_t i = 0; i < wanted.size(); ++i) {
@@ -310,16 +336,19 @@ Vec3 Compositor::Impl::shade(const Hit& hit, const Vec4& base, RenderMode mode) 
   return unlit ? Vec3(base) : Vec3(base) * light(hit) + emission(hit);
 }
 
-Vec3 Compositor::Impl::radiance(const Vec3& origin, const Vec3& direction, RenderMode mode, float& lit,
-                                Sighting* sighting) const {
+Vec3 Compositor::Impl::radiance(const ViewRay& ray, RenderMode mode, float& lit, Sighting* sighting) const {
   constexpr int kMaxLayers = 64;
   Vec3 sum(0.0f);
   float throughput = 1.0f;
   float tnear = 0.0f;
   for (int layer = 0; layer < kMaxLayers && throughput > 1e-3f; ++layer) {
-    const RTCRayHit query = trace(origin, direction, tnear, false);
+    const RTCRayHit query = trace(ray.origin, ray.direction, tnear, false);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) break;
-    const Hit hit = hitAt(query.hit.geomID, query.hit.primID, query.hit.u, query.hit.v);
+    Hit hit = hitAt(query.hit.geomID, query.hit.primID, query.hit.u, query.hit.v);
+    const Vec3 normal = glm::normalize(facing(hit));
+    const float cosine = glm::dot(normal, ray.direction);
+    // Along the slope it is wider by the cosine: the mean of both ways keeps details that one of them can show.
+    hit.width = (ray.width + ray.spread * query.ray.tfar) / std::sqrt(std::max(std::abs(cosine), 1e-2f));
     const Vec4 base = baseColor(hit);
     const float alpha = hit.shape->material->alphaMode == AlphaMode::Blend ? std::clamp(base.w, 0.0f, 1.0f) : 1.0f;
     sum += throughput * alpha * shade(hit, base, mode);
@@ -329,13 +358,12 @@ Vec3 Compositor::Impl::radiance(const Vec3& origin, const Vec3& direction, Rende
       sighting->surface = true;
       sighting->distance = query.ray.tfar;
       sighting->primitive = hit.shape->number;
-      const Vec3 normal = glm::normalize(facing(hit));
-      sighting->normal = glm::dot(normal, direction) > 0.0f ? -normal : normal;
+      sighting->normal = cosine > 0.0f ? -normal : normal;
     }
     tnear = query.ray.tfar * (1.0f + 1e-5f);
   }
   if (throughput > 1e-3f && mode == RenderMode::Lit)
-    sum += throughput * environmentRadiance(baked.scene.environment, direction);
+    sum += throughput * environmentRadiance(baked.scene.environment, ray.direction);
   return sum;
 }
 
@@ -360,7 +388,7 @@ Vec3 Compositor::boundsMax() const { return impl_->most; }
 Sighting Compositor::look(const Vec3& origin, const Vec3& direction) const {
   Sighting sighting;
   float lit = 0.0f;
-  sighting.radiance = impl_->radiance(origin, direction, RenderMode::Lit, lit, &sighting);
+  sighting.radiance = impl_->radiance({origin, direction}, RenderMode::Lit, lit, &sighting);
   const RTCRayHit first = impl_->trace(origin, direction, 0.0f, true);
   if (first.hit.geomID == RTC_INVALID_GEOMETRY_ID) return sighting;
   const Hit hit = impl_->hitAt(first.hit.geomID, first.hit.primID, first.hit.u, first.hit.v);
@@ -372,6 +400,7 @@ Expected<Still> Compositor::render(const Camera& camera, const RenderOptions& op
   Still still{Image(options.width, options.height, 3), Image(options.width, options.height, 1)};
   const float width = static_cast<float>(options.width);
   const float height = static_cast<float>(options.height);
+  const float side = 2.0f / (height * std::sqrt(static_cast<float>(options.samplesPerPixel)));
   progress.begin("render", static_cast<std::uint64_t>(options.height));
   parallelFor(toSize(options.height), 4, [&](std::size_t first, std::size_t last) {
     for (std::size_t row = first; row < last && !progress.cancelled(); ++row) {
@@ -381,11 +410,9 @@ Expected<Still> Compositor::render(const Camera& camera, const RenderOptions& op
         float lit = 0.0f;
         for (int i = 0; i < options.samplesPerPixel; ++i) {
           const Vec2 offset = pixelSample(i);
-          Vec3 origin;
-          const Vec3 direction =
-              rayDirection(camera, 2.0f * (static_cast<float>(x) + offset.x) / width - 1.0f,
-                           1.0f - 2.0f * (static_cast<float>(y) + offset.y) / height, width / height, origin);
-          sum += Vec3d(impl_->radiance(origin, direction, options.mode, lit, nullptr));
+          const ViewRay ray = viewRay(camera, 2.0f * (static_cast<float>(x) + offset.x) / width - 1.0f,
+                                      1.0f - 2.0f * (static_cast<float>(y) + offset.y) / height, width / height, side);
+          sum += Vec3d(impl_->radiance(ray, options.mode, lit, nullptr));
         }
         still.radiance.setRgb(x, y, Vec3(sum / static_cast<double>(options.samplesPerPixel)));
         still.lit.at(x, y)[0] = lit / static_cast<float>(options.samplesPerPixel);

@@ -49,9 +49,10 @@ class Compositor {
   ~Compositor();
   Compositor(Compositor&&) noexcept;
 
-  /// Back faces of single-sided materials are culled, alpha masks cut, blended surfaces mixed front to back. A
-  /// primitive without lightmap that is not unlit is shown under the mean light of the bake.
-  /// The same for any thread count. Errors: Interrupted.
+  /// Colour, emission and normal maps are filtered to what a ray stands for, alpha masks are not; the light never is,
+  /// or charts would run together. Back faces of single-sided materials are culled, alpha masks cut, blended surfaces
+  /// mixed front to back. A primitive without lightmap that is not unlit is shown under the mean light of the bake. The
+  /// same for any thread count. Errors: Interrupted.
   Expected<Still> render(const Camera& camera, const RenderOptions& options, Progress& progress) const;
 
   Sighting look(const Vec3& origin, const Vec3& direction) const;

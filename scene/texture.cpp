@@ -146,4 +146,52 @@ void Texture::prefetch(const TextureRef& ref, Vec2 uv) const {
   }
 }
 
+Texture Texture::halved() const {
+  Texture half;
+  half.width_ = std::max(width_ / 2, 1);
+  half.height_ = std::max(height_ / 2, 1);
+  half.space_ = space_;
+  const std::size_t values = 4 * static_cast<std::size_t>(half.width_) * static_cast<std::size_t>(half.height_);
+  (bytes_.empty() ? half.floats_.resize(values) : half.bytes_.resize(values));
+  // Texel i of n covers source texels i * size / n to (i + 1) * size / n, whose ends may lie inside one.
+  const auto share = [](int source, int i, int n, int size) {
+    return static_cast<float>(std::min((source + 1) * n, (i + 1) * size) - std::max(source * n, i * size)) /
+           static_cast<float>(size);
+  };
+  std::size_t out = 0;
+  for (int y = 0; y < half.height_; ++y)
+    for (int x = 0; x < half.width_; ++x) {
+      Vec4 mean(0.0f);
+      for (int v = y * height_ / half.height_; v * half.height_ < (y + 1) * height_; ++v)
+        for (int u = x * width_ / half.width_; u * half.width_ < (x + 1) * width_; ++u)
+          mean += share(u, x, half.width_, width_) * share(v, y, half.height_, height_) * fetch(u, v);
+      for (int c = 0; c < 4; ++c, ++out) {
+        if (bytes_.empty())
+          half.floats_[out] = mean[c];
+        else
+          half.bytes_[out] = static_cast<std::uint8_t>(std::lround(
+              255.0f * std::clamp(space_ == ColorSpace::Srgb && c < 3 ? linearToSrgb(mean[c]) : mean[c], 0.0f, 1.0f)));
+      }
+    }
+  return half;
+}
+
+TexturePyramid::TexturePyramid(Texture finest) {
+  levels_.push_back(std::move(finest));
+  while (levels_.back().width() > 1 || levels_.back().height() > 1) levels_.push_back(levels_.back().halved());
+}
+
+Vec4 TexturePyramid::sample(const TextureRef& ref, Vec2 uv, float uvWidth) const {
+  const Texture& finest = levels_.front();
+  const float stretch = std::sqrt(std::abs(glm::determinant(glm::mat2(ref.uvMatrix))));
+  const float texels =
+      uvWidth * stretch * std::sqrt(static_cast<float>(finest.width()) * static_cast<float>(finest.height()));
+  if (!(texels > 1.0f)) return finest.sample(ref, uv);
+  const float level = std::min(std::log2(texels), static_cast<float>(levels_.size() - 1));
+  const auto low = static_cast<std::size_t>(level);
+  const Vec4 finer = levels_[low].sample(ref, uv);
+  if (low + 1 == levels_.size()) return finer;
+  return glm::mix(finer, levels_[low + 1].sample(ref, uv), level - static_cast<float>(low));
+}
+
 }  // namespace lumel

@@ -28,6 +28,9 @@ class Texture {
   Vec4 sample(const TextureRef& ref, Vec2 uv) const;
   /// The fourth component of sample() alone.
   float sampleAlpha(const TextureRef& ref, Vec2 uv) const;
+  /// The next level of a mip chain: half as wide and high (at least 1), each texel the mean, of linear values, of what
+  /// it covers. An 8-bit image stays one.
+  Texture halved() const;
   /// Asks the processor to bring the texels that sample() will read closer. No effect on any result.
   void prefetch(const TextureRef& ref, Vec2 uv) const;
 
@@ -47,6 +50,20 @@ class Texture {
   ColorSpace space_ = ColorSpace::Linear;
   std::vector<std::uint8_t> bytes_;  // RGBA
   std::vector<float> floats_;        // RGBA, linear
+};
+
+/// A texture and its mip chain (Williams 1983), for lookups where a texel is small in the picture.
+class TexturePyramid {
+ public:
+  explicit TexturePyramid(Texture finest);
+
+  const Texture& finest() const { return levels_.front(); }
+  /// Mean about `uv` over roughly `uvWidth` on a side, in the units of `uv`, before ref.uvMatrix: between the two
+  /// levels whose texels are about as wide. 0 is finest().sample().
+  Vec4 sample(const TextureRef& ref, Vec2 uv, float uvWidth) const;
+
+ private:
+  std::vector<Texture> levels_;  // the last is one texel
 };
 
 }  // namespace lumel

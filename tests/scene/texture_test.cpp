@@ -85,6 +85,41 @@ TEST(Texture, TransformAppliesAndWildCoordinatesAreHarmless) {
   for (const float wild : {1e30f, -1e30f, NAN, INFINITY}) EXPECT_TRUE(std::isfinite(t.sample(ref, {wild, wild}).x));
 }
 
+TEST(Texture, HalvedIsTheMeanOfLinearValues) {
+  const Texture srgb = decoded(checker(), ColorSpace::Srgb);
+  const Texture half = srgb.halved();
+  EXPECT_EQ(half.width(), 1);
+  EXPECT_EQ(half.height(), 1);
+  const float mean = (0.0f + 1.0f + srgbToLinear(0.4f) + srgbToLinear(0.6f)) / 4.0f;
+  EXPECT_NEAR(half.fetch(0, 0).x, mean, 0.005f);                         // a step of 8 bits at this level
+  EXPECT_NEAR(half.fetch(0, 0).w, (0.2f + 3.0f) / 4.0f, 1.0f / 255.0f);  // alpha is linear
+  // Odd sizes: the middle texel of five counts half to either side.
+  Image ramp(5, 1, 1);
+  for (int x = 0; x < 5; ++x) ramp.at(x, 0)[0] = static_cast<float>(x) / 5.0f;
+  const Texture odd = decoded({"ramp", "", *encodePng(ramp)}, ColorSpace::Linear).halved();
+  ASSERT_EQ(odd.width(), 2);
+  EXPECT_NEAR(odd.fetch(0, 0).x, (0.0f + 0.2f + 0.5f * 0.4f) / 2.5f, 1.0f / 255.0f);
+  EXPECT_NEAR(odd.fetch(1, 0).x, (0.5f * 0.4f + 0.6f + 0.8f) / 2.5f, 1.0f / 255.0f);
+}
+
+TEST(TexturePyramid, WideLookupsSeeTheMean) {
+  Image stripes(64, 64, 3);
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) stripes.setRgb(x, y, Vec3(x % 2 == 0 ? 1.0f : 0.0f));
+  const TexturePyramid pyramid(decoded({"stripes", "", *encodePng(stripes)}, ColorSpace::Linear));
+  TextureRef ref;
+  const Vec2 white{0.5f / 64.0f, 0.5f};
+  EXPECT_EQ(pyramid.sample(ref, white, 0.0f).x, 1.0f);
+  EXPECT_EQ(pyramid.sample(ref, white, 1.0f / 64.0f).x, 1.0f);
+  EXPECT_NEAR(pyramid.sample(ref, white, 2.0f / 64.0f).x, 0.5f, 0.005f);
+  const float between = pyramid.sample(ref, white, 1.5f / 64.0f).x;
+  EXPECT_GT(between, 0.6f);
+  EXPECT_LT(between, 0.9f);
+  ref.uvMatrix[0][0] = ref.uvMatrix[1][1] = 2.0f;  // the map twice as often: texels are half as wide
+  EXPECT_NEAR(pyramid.sample(ref, white, 1.0f / 64.0f).x, 0.5f, 0.005f);
+  for (const float wild : {1e30f, INFINITY, NAN}) EXPECT_TRUE(std::isfinite(pyramid.sample(ref, white, wild).x));
+}
+
 TEST(Texture, MissingAndBrokenImagesAreErrors) {
   EXPECT_EQ(Texture::decode({"gone", "", {}}, ColorSpace::Srgb).error().message, "gone: the image is missing");
   // No cut PNG here: the library's own reader leaks its error text on one (scene_foundation_test has that case).
