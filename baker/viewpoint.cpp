@@ -39,15 +39,9 @@ class Chooser {
         size_(std::max(glm::length(most_ - least_), 1e-6f)) {}
 
   Camera choose() {
-    std::vector<Candidate> candidates = inside();
-    addOutside(candidates);
-    score(candidates, 16, 9);
-    constexpr std::size_t kRefined = 12;
-    const std::size_t kept = std::min(kRefined, candidates.size());
-    // Stable order for equal scores: the choice must not depend on the library's sort.
-    std::stable_sort(candidates.begin(), candidates.end(),
-                     [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
-    candidates.resize(kept);
+    std::vector<Candidate> candidates = best(inside());
+    const std::vector<Candidate> outer = outside();
+    candidates.insert(candidates.end(), outer.begin(), outer.end());
     score(candidates, 64, 36);
     return std::max_element(candidates.begin(), candidates.end(),
                             [](const Candidate& a, const Candidate& b) { return a.score < b.score; })
@@ -56,12 +50,11 @@ class Chooser {
 
  private:
   static constexpr float kDarkShare = 0.06f;
-  static constexpr double kOutsidePenalty = 5.0;
-  static constexpr double kOpen = 0.65;  // less built up than this: better seen from outside
+  // What a view of the whole scene must be better by: it shows more parts than any one room, but none of them as near.
+  static constexpr double kOutsidePenalty = 0.65;
 
-  std::vector<Candidate> inside() {
+  std::vector<Candidate> inside() const {
     std::vector<Candidate> candidates;
-    double places = 0.0, walled = 0.0;
     for (unsigned i = 1; i <= kPlaces; ++i) {
       const Vec3 share(radicalInverse(i, 2), radicalInverse(i, 3), radicalInverse(i, 5));
       const Vec3 start = least_ + share * (most_ - least_);
@@ -75,8 +68,6 @@ class Chooser {
       const float height = std::min(0.5f * room, 0.12f * size_);
       if (!(height > 1e-3f * size_)) continue;
       const Vec3 eye = ground + Vec3(0, height, 0);
-      ++places;
-      walled += wallsAround(eye);
       for (int k = 0; k < kDirections; ++k)
         for (float pitch : kPitches) {
           const float yaw =
@@ -85,30 +76,46 @@ class Chooser {
           candidates.push_back({cameraLookingAt(eye, eye + forward, kInsideFov)});
         }
     }
-    if (places > 0.0) enclosed_ = walled / places;
     return candidates;
   }
 
-  /// Share of the directions over the horizon, and up, in which something stands.
-  double wallsAround(const Vec3& eye) const {
-    int hits = compositor_.look(eye, Vec3(0, 1, 0)).surface ? 1 : 0;
-    for (int k = 0; k < 8; ++k) {
-      const float yaw = 0.25f * kPi * static_cast<float>(k);
-      if (compositor_.look(eye, Vec3(std::cos(yaw), 0.0f, std::sin(yaw))).surface) ++hits;
-    }
-    return hits / 9.0;
-  }
+  bool isDark(const Sighting& seen) const { return luminance(seen.radiance) < kDarkShare * meanLight_; }
 
-  void addOutside(std::vector<Candidate>& candidates) const {
+  std::vector<Candidate> outside() const {
+    std::vector<Candidate> candidates;
     const Vec3 center = 0.5f * (least_ + most_);
-    const float distance = 0.5f * size_ / std::tan(0.5f * kOutsideFov) * 0.85f;
     for (float elevation : {0.02f, 0.3f, 0.6f})
       for (int k = 0; k < 16; ++k) {
         const float azimuth = 2.0f * kPi * static_cast<float>(k) / 16.0f;
         const Vec3 away(std::cos(elevation) * std::sin(azimuth), std::sin(elevation),
                         std::cos(elevation) * std::cos(azimuth));
-        candidates.push_back({cameraLookingAt(center + distance * away, center, kOutsideFov), true});
+        candidates.push_back({cameraLookingAt(center + fittingDistance(away) * away, center, kOutsideFov), true});
       }
+    return candidates;
+  }
+
+  /// How far from the middle, towards unit `away`, an eye sees all corners of the scene's box.
+  float fittingDistance(const Vec3& away) const {
+    const Mat3 turn(cameraLookingAt(away, Vec3(0.0f), kOutsideFov).worldFromCamera);
+    const float tangent = std::tan(0.5f * kOutsideFov);
+    float distance = 0.0f;
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      const Vec3 sides(corner & 1u ? 0.5f : -0.5f, corner & 2u ? 0.5f : -0.5f, corner & 4u ? 0.5f : -0.5f);
+      const Vec3 p = glm::transpose(turn) * (sides * (most_ - least_));
+      distance = std::max(distance, p.z + std::max(std::abs(p.x) / aspect_, std::abs(p.y)) / tangent);
+    }
+    return 1.05f * distance;
+  }
+
+  /// The best by a coarse grid of rays.
+  std::vector<Candidate> best(std::vector<Candidate> candidates) const {
+    constexpr std::size_t kKept = 12;
+    score(candidates, 16, 9);
+    // Stable order for equal scores: the choice must not depend on the library's sort.
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
+    if (candidates.size() > kKept) candidates.resize(kKept);
+    return candidates;
   }
 
   void score(std::vector<Candidate>& candidates, int columns, int rows) const {
@@ -142,7 +149,7 @@ class Chooser {
         }
         if (seen.distance < 0.02f * size_) ++near;
         const float brightness = luminance(seen.radiance);
-        if (brightness < kDarkShare * meanLight_) ++dark;
+        if (isDark(seen)) ++dark;
         stops += std::clamp(std::log2(meanLight_ / std::max(brightness, 1e-6f * meanLight_)), 0.0f, 6.0f);
         ++depth[static_cast<int>(std::floor(std::log2(std::max(seen.distance / size_, 1e-6f))))];
         const std::array<int, 4> patch = patchOf(origin + seen.distance * direction, seen);
@@ -152,11 +159,13 @@ class Chooser {
       }
     const double total = static_cast<double>(columns) * static_cast<double>(rows);
     if (sky == total) return -1e6;
-    const double allowedSky = candidate.outside ? 0.6 : compositor_.hasSky() ? 0.3 : 0.1;
+    const double allowedSky = candidate.outside ? 1.0 : compositor_.hasSky() ? 0.3 : 0.1;
     const double skyExcess = std::max(0.0, sky / total - allowedSky);
-    return entropy(patches, total) + 0.5 * entropy(depth, total) + 0.5 * entropy(primitives, total) +
-           entropy(facings, total) - 0.08 * stops / total - 3.0 * skyExcess - 4.0 * back / total - 3.0 * near / total -
-           2.0 * dark / total - (candidate.outside ? kOutsidePenalty * (enclosed_ - kOpen) : 0.0);
+    // From outside the whole scene fits the picture, however much sky is about it.
+    const double counted = candidate.outside ? total - sky : total;
+    return entropy(patches, counted) + 0.5 * entropy(depth, counted) + 0.5 * entropy(primitives, counted) +
+           entropy(facings, counted) - 0.08 * stops / counted - 3.0 * skyExcess - 4.0 * back / counted -
+           3.0 * near / total - 2.0 * dark / counted - (candidate.outside ? kOutsidePenalty : 0.0);
   }
 
   /// Grid cell and the axis that the surface faces most.
@@ -182,7 +191,6 @@ class Chooser {
   const Vec3 least_;
   const Vec3 most_;
   const float size_;
-  double enclosed_ = 0.0;  // how much of the surroundings of a place inside is built up, 0..1
   const float meanLight_ = luminance(compositor_.meanLight());
 };
 
