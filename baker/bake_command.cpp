@@ -54,10 +54,10 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
   options.choice("adaptive", a.bake.adaptive, {"off", "on"},
                  "After 32 samples leave out texels whose error is too small to be seen beside that of others; off: "
                  "the same number everywhere");
-  options.share("target-error", a.bake.targetError, {0.0f, 1.0f},
-                 "Sample each part of a page until the relative standard error of its light is so small (1% or 0.01); "
-                 "done when 95% of the texels are. Texels darker than a tenth of the mean count as so bright. 0: off, "
-                 "the same number of rays everywhere");
+  options.share("target-error", a.bake.targetError, {0.0f, 0.5f},
+                "Sample each part of a page until the relative standard error of its light is so small (1% or 0.01); "
+                "done when 95% of the texels are. Texels darker than a tenth of the mean count as so bright. 0: off, "
+                "the same number of rays everywhere");
   options.integer("max-samples", a.bake.maxSamples, {1, 1 << 24},
                   "Most gather rays per texel with --target-error, whether it is met or not");
   options.number("time-budget", a.bake.timeBudgetSeconds, {0.0f},
@@ -129,10 +129,10 @@ void printSummary(const fs::path& output, const AtlasResult& atlas, const BakeRe
   const BakeStats& stats = result.stats;
   const double relative = stats.meanFlat > 0.0 ? 100.0 * stats.meanStandardError / stats.meanFlat : 0.0;
   const double rays = static_cast<double>(stats.rays + stats.shadowRays);
-  std::fprintf(stderr, "%s: %zu page%s, %.1f%% covered, %zu charts, %llu texels", output.c_str(),
+  std::fprintf(stderr, "%s: %zu page%s, %.1f%% covered, %zu chart%s, %llu texels", output.c_str(),
                atlas.atlas.pages.size(), atlas.atlas.pages.size() == 1 ? "" : "s",
                texels > 0 ? 100.0 * static_cast<double>(stats.texels) / texels : 0.0, atlas.atlas.charts.size(),
-               static_cast<unsigned long long>(stats.texels));
+               atlas.atlas.charts.size() == 1 ? "" : "s", static_cast<unsigned long long>(stats.texels));
   if (atlas.atlas.texelsPerMeter > 0.0f)
     std::fprintf(stderr, " at %.4g per metre", static_cast<double>(atlas.atlas.texelsPerMeter));
   std::fprintf(stderr, "\nmean light %.4g, standard error %.2g%%, projection residual %.2g%%\n", stats.meanFlat,
@@ -213,6 +213,12 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   clock.start("atlas");
   const auto atlas = makeAtlas(*scene, a, context);
   if (!atlas) return atlas.error();
+  if (!context.quiet && atlas->atlas.charts.empty())
+    std::fprintf(
+        stderr,
+        "lumel: warning: no triangle of the scene gets a lightmap (%zu without area, %zu primitives of points or "
+        "lines are left out)\n",
+        scene->report.degenerateTriangles, scene->report.skippedPrimitives);
   returnFreeMemory();
   clock.start("texels");
   const auto texels = findTexels(atlas->atlas);

@@ -50,6 +50,10 @@ std::string explain(const CLI::ParseError& error, const std::vector<std::string>
   for (char& c : message)
     if (c == '\n') c = ' ';
   if (!parsed) return message + "; see lumel --help";
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error))
+    for (const Option& option : parsed->command.options.all())
+      if (message.starts_with("--" + option.name + ":"))
+        message = "--" + option.name + ": the value is missing: " + option.placeholder;
   if (dynamic_cast<const CLI::ExtrasError*>(&error))
     for (const std::string& argument : arguments) {
       if (argument.rfind("--", 0) != 0) continue;
@@ -61,6 +65,12 @@ std::string explain(const CLI::ParseError& error, const std::vector<std::string>
       break;
     }
   return message + "; see lumel " + parsed->command.name + " --help";
+}
+
+std::string joined(const std::set<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
 }
 
 Expected<void> fillOptions(Parsed& parsed, const std::set<std::string>& allCommands) {
@@ -114,7 +124,7 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
     return nullptr;
   };
   if (!arguments.empty() && !arguments[0].starts_with('-') && !names.count(arguments[0]))
-    return usageError("unknown command '" + arguments[0] + "'; see lumel --help");
+    return usageError("unknown command '" + arguments[0] + "'; use one of " + joined(names) + "; see lumel --help");
   try {
     root.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::CallForHelp&) {
@@ -131,8 +141,7 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
   Parsed& parsed = *chosen();
   if (auto filled = fillOptions(parsed, names); !filled) return filled;
   TerminalProgress progress(parsed.quiet);
-  CommandContext context{progress, out, parsed.quiet, parsed.command.options.resolved(),
-                         parsed.command.options};
+  CommandContext context{progress, out, parsed.quiet, parsed.command.options.resolved(), parsed.command.options};
   return parsed.command.run(context);
 }
 

@@ -4,8 +4,8 @@
 #include <toml++/toml.h>
 
 #include <charconv>
-#include <fstream>
-#include <iterator>
+
+#include "scene/file_access.h"
 
 namespace lumel {
 namespace {
@@ -95,11 +95,10 @@ class ConfigReader {
 
 Expected<void> applyConfig(const std::filesystem::path& file, const std::string& command,
                            const std::set<std::string>& allCommands, OptionTable& options) {
-  std::ifstream in(file, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  if (!in.is_open() || in.bad())
-    return usageError(file.string() + ": the config file cannot be read; give a TOML file to --config");
-  const toml::parse_result parsed = toml::parse(std::string_view(text), file.string());
+  const auto bytes = readFile(file);
+  if (!bytes) return usageError(bytes.error().message + "; give a TOML file to --config");
+  const std::string_view text(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+  const toml::parse_result parsed = toml::parse(text, file.string());
   if (!parsed)
     return usageError(file.string() + ":" + std::to_string(parsed.error().source().begin.line) + ": " +
                       std::string(parsed.error().description()));

@@ -151,11 +151,14 @@ Option& OptionTable::share(const std::string& name, float& target, Range<float> 
   Option& o = number(name, target, range, help);
   o.set = [&target, range](Texts texts) -> Problem {
     const std::string& text = texts[0];
-    if (!text.ends_with('%')) return parseIn(text, range, target);
-    float percent = 0.0f;
-    const Range<float> percents{100.0f * range.least, 100.0f * range.most};
-    if (auto problem = parseIn(text.substr(0, text.size() - 1), percents, percent)) return problem;
-    target = percent / 100.0f;
+    const bool percent = text.ends_with('%');
+    float value = 0.0f;
+    if (auto problem = parse(percent ? text.substr(0, text.size() - 1) : text, value)) return problem;
+    if (percent) value /= 100.0f;
+    if (value < range.least || value > range.most)
+      return text + " is out of range: use " + shortText(100.0f * range.least) + "% to " +
+             shortText(100.0f * range.most) + "%, or " + shortText(range.least) + " to " + shortText(range.most);
+    target = value;
     return {};
   };
   return o;

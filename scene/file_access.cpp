@@ -54,7 +54,8 @@ Expected<std::vector<std::uint8_t>> readFile(const fs::path& file) {
   std::error_code ec;
   const auto status = fs::status(file, ec);
   if (!fs::exists(status)) return inputError(file.string() + ": no such file");
-  if (!fs::is_regular_file(status)) return inputError(file.string() + ": is not a file");
+  if (!fs::is_regular_file(status))
+    return inputError(file.string() + ": is not a file" + (fs::is_directory(status) ? " but a folder" : ""));
   const auto size = fs::file_size(file, ec);
   if (ec) return inputError(file.string() + ": cannot be read: " + ec.message());
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> in(std::fopen(file.c_str(), "rb"), &std::fclose);

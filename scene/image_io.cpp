@@ -56,6 +56,9 @@ bool isPng(const Head& head) {
 Error cutOff(const std::string& name) { return inputError(name + ": is cut off: the file ends before the image does"); }
 
 Error unreadable(const std::string& name, const std::string& why) {
+  if (why.find("could not find a format reader") != std::string::npos)
+    return inputError(name +
+                      ": is no image of a known kind; use .png, .jpg, .tga, .tif, .bmp, .webp, .dds, .exr or .hdr");
   return inputError(name + ": not an image that can be read" + (why.empty() ? "" : ": ") +
                     why.substr(0, why.find('\n')));
 }
@@ -125,6 +128,7 @@ std::array<int, 2> imageSize(std::span<const std::uint8_t> encoded) {
 Expected<LoadedImage> readImage(const std::filesystem::path& file, const Progress& progress) {
   const std::string name = file.string();
   std::error_code ec;
+  if (std::filesystem::is_directory(file, ec)) return inputError(name + ": is a folder, not an image file");
   if (!std::filesystem::is_regular_file(file, ec)) return inputError(name + ": no such file");
   std::ifstream bytes(file, std::ios::binary);
   const auto read = [&](std::uint64_t at, std::span<std::uint8_t> into) {

@@ -62,14 +62,17 @@ TEST(ExitCodes, WrongCommandLineIs2) {
   EXPECT_TRUE(fails(bake({"--samples", "0"}), 2, {"--samples", "0", "use 1"}));
   EXPECT_TRUE(fails(bake({"--samples", "many"}), 2, {"--samples", "'many'", "number"}));
   EXPECT_TRUE(fails(bake({"--samples", "99999999999"}), 2, {"--samples", "too large"}));
-  EXPECT_TRUE(fails(bake({"--samples"}), 2, {"--samples"}));
+  EXPECT_TRUE(fails(bake({"--samples"}), 2, {"--samples", "value is missing"}));
   EXPECT_TRUE(fails(bake({"--padding", "-1"}), 2, {"--padding", "-1"}));
   EXPECT_TRUE(fails(bake({"--sky-strength", "nan"}), 2, {"--sky-strength", "finite"}));
   EXPECT_TRUE(fails(bake({"--sky-color", "1", "2"}), 2, {"--sky-color", "3"}));
   EXPECT_TRUE(fails(bake({"--sky-color", "1", "-2", "0"}), 2, {"--sky-color", "-2"}));
   EXPECT_TRUE(fails(bake({"--page-size", "30"}), 2, {"--page-size", "multiple of 4"}));
   EXPECT_TRUE(fails(bake({"--projection", "round"}), 2, {"--projection", "raw|flat|fit"}));
-  EXPECT_TRUE(fails(bake({"--target-error", "200%"}), 2, {"--target-error", "200", "0 to 100"}));
+  EXPECT_TRUE(fails(bake({"--target-error", "200%"}), 2, {"--target-error", "200%", "0% to 50%"}));
+  EXPECT_TRUE(fails(bake({"--target-error", "1"}), 2, {"--target-error", "1 is", "0% to 50%"}));  // 1% is meant
+  EXPECT_TRUE(fails(run({"bkae"}), 2, {"unknown command 'bkae'", "bake"}));
+  EXPECT_TRUE(fails(bake({"--config", std::filesystem::temp_directory_path()}), 2, {"--config", "folder"}));
   EXPECT_TRUE(fails(bake({"--target-error", "0.1", "--samples", "99", "--max-samples", "64"}), 2,
                     {"--samples 99", "--max-samples 64"}));
   EXPECT_TRUE(fails(bake({"--sky", "x.hdr", "--sky-color", "1", "1", "1"}), 2, {"--sky-color"}));
@@ -112,10 +115,28 @@ TEST(ExitCodes, WrongInputIs3) {
   writeFile(dir / "future.gltf", unknown.dump());
   EXPECT_TRUE(fails(run({"bake", dir / "future.gltf", "-o", out}), 3, {"future.gltf", "EXT_from_the_future"}));
   EXPECT_TRUE(fails(run({"bake", floorScene(dir), "-o", out, "--sky", dir / "none.hdr"}), 3, {"none.hdr"}));
+  std::filesystem::create_directory(dir / "folder");
+  EXPECT_TRUE(fails(run({"bake", dir / "folder", "-o", out}), 3, {"folder: is not a file but a folder"}));
+  EXPECT_TRUE(fails(run({"bake", floorScene(dir), "-o", out, "--sky", dir / "folder"}), 3, {"is a folder"}));
+  writeFile(dir / "empty.glb", "");
+  EXPECT_TRUE(fails(run({"bake", dir / "empty.glb", "-o", out}), 3, {"empty.glb", "is empty"}));
+  writeFile(dir / "notes.txt", "not a picture");
+  EXPECT_TRUE(fails(run({"info", dir / "notes.txt"}), 3, {"notes.txt: is no image of a known kind"}));
   EXPECT_FALSE(std::filesystem::exists(out));
   EXPECT_TRUE(fails(run({"render", dir, "-o", dir / "still.png"}), 3, {"bake.json"}));
   EXPECT_TRUE(fails(run({"info", dir / "none.exr"}), 3, {"none.exr"}));
   EXPECT_TRUE(fails(run({"diff", dir / "none.exr", dir / "none.exr"}), 3, {"none.exr"}));
+}
+
+TEST(ExitCodes, NothingToBakeIsAWarning) {
+  const auto dir = scratch();
+  nlohmann::json gltf = gltfOf({floorQuad()});
+  for (auto& mesh : gltf["meshes"])
+    for (auto& primitive : mesh["primitives"]) primitive["mode"] = 1;  // lines
+  writeFile(dir / "lines.gltf", gltf.dump());
+  const Outcome outcome = run({"bake", dir / "lines.gltf", "-o", dir / "out", "--sky-color", "1", "1", "1"});
+  EXPECT_EQ(outcome.exitCode, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("no triangle of the scene gets a lightmap"), std::string::npos) << outcome.err;
 }
 
 TEST(ExitCodes, OutputThatCannotBeWrittenIs1BeforeTheWork) {
