@@ -26,9 +26,8 @@ Expected<std::vector<Mat4>> jointMatrices(const GltfDocument& document, int skin
 void transformVertex(Primitive& primitive, std::size_t v, const Mat4& m) {
   primitive.positions[v] = Vec3(m * Vec4(primitive.positions[v], 1.0f));
   if (!primitive.normals.empty()) {
-    const Vec3 x(m[0]), y(m[1]), z(m[2]);
-    const Mat3 cofactor(glm::cross(y, z), glm::cross(z, x), glm::cross(x, y));
-    const float side = glm::dot(x, cofactor[0]) < 0 ? -1.0f : 1.0f;
+    const Mat3 cofactor = cofactorMatrix(Mat3(m));
+    const float side = glm::dot(Vec3(m[0]), cofactor[0]) < 0 ? -1.0f : 1.0f;
     primitive.normals[v] = side * (cofactor * primitive.normals[v]);
   }
   if (!primitive.tangents.empty())

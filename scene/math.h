@@ -2,7 +2,10 @@
 #pragma once
 
 #define GLM_FORCE_XYZW_ONLY
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <numbers>
@@ -24,6 +27,39 @@ inline bool isFinite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite
 
 /// Rec. 709 luminance of a linear RGB colour.
 inline float luminance(const Vec3& c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
+
+/// Area of a triangle in the plane, positive where its corners run counter-clockwise with y up.
+inline double signedArea(const Vec2d& a, const Vec2d& b, const Vec2d& c) {
+  return 0.5 * ((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x));
+}
+inline double triangleArea(const Vec2d& a, const Vec2d& b, const Vec2d& c) { return std::abs(signedArea(a, b, c)); }
+inline double triangleArea(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
+  return 0.5 * glm::length(glm::cross(b - a, c - a));
+}
+
+/// How a matrix transforms cross products, so normals too: its inverse transpose times its determinant, which exists
+/// for flattening matrices as well. A mirroring matrix turns them to the other side.
+inline Mat3 cofactorMatrix(const Mat3& m) {
+  return {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1])};
+}
+
+/// Bit patterns of the coordinates, with -0 as 0: equal, and sorted alike, exactly where the coordinates are equal.
+inline std::array<std::uint32_t, 2> bitsOf(const Vec2& v) {
+  const Vec2 clean = v + 0.0f;
+  return {std::bit_cast<std::uint32_t>(clean.x), std::bit_cast<std::uint32_t>(clean.y)};
+}
+inline std::array<std::uint32_t, 3> bitsOf(const Vec3& v) {
+  const Vec3 clean = v + 0.0f;
+  return {std::bit_cast<std::uint32_t>(clean.x), std::bit_cast<std::uint32_t>(clean.y),
+          std::bit_cast<std::uint32_t>(clean.z)};
+}
+
+/// i taken modulo size into [0, size).
+template <class Int>
+Int wrapIndex(Int i, Int size) {
+  i %= size;
+  return i < 0 ? i + size : i;
+}
 
 /// A right- or left-handed orthonormal frame at a surface point: tangent, bitangent, normal, all in one space.
 struct Frame {

@@ -17,10 +17,6 @@ Vec3d newellNormal(std::span<const Vec3> corners) {
   return normal;
 }
 
-double signedArea(const Vec2d& a, const Vec2d& b, const Vec2d& c) {
-  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-}
-
 bool contains(const Vec2d& a, const Vec2d& b, const Vec2d& c, const Vec2d& p) {
   return signedArea(a, b, p) >= 0 && signedArea(b, c, p) >= 0 && signedArea(c, a, p) >= 0;
 }

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
+#include <utility>
 
 #include "scene/tangents.h"
 #include "scene/vertex_splitter.h"
@@ -154,17 +154,13 @@ void finishPrimitive(Primitive& primitive, const Material& material, LoadReport&
 }
 
 std::vector<std::uint32_t> weldPositions(const std::vector<Vec3>& positions) {
-  std::vector<std::array<std::uint32_t, 4>> keys(positions.size());
-  for (std::uint32_t i = 0; i < keys.size(); ++i) {
-    const Vec3 p = positions[i] + 0.0f;  // -0 becomes 0
-    keys[i] = {std::bit_cast<std::uint32_t>(p.x), std::bit_cast<std::uint32_t>(p.y), std::bit_cast<std::uint32_t>(p.z),
-               i};
-  }
+  std::vector<std::pair<std::array<std::uint32_t, 3>, std::uint32_t>> keys(positions.size());
+  for (std::uint32_t i = 0; i < keys.size(); ++i) keys[i] = {bitsOf(positions[i]), i};
   std::sort(keys.begin(), keys.end());
   std::vector<std::uint32_t> first(positions.size());
   for (std::size_t i = 0; i < keys.size(); ++i) {
-    const bool same = i > 0 && std::equal(keys[i].begin(), keys[i].begin() + 3, keys[i - 1].begin());
-    first[keys[i][3]] = same ? first[keys[i - 1][3]] : keys[i][3];
+    const bool same = i > 0 && keys[i].first == keys[i - 1].first;
+    first[keys[i].second] = same ? first[keys[i - 1].second] : keys[i].second;
   }
   return first;
 }
