@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <limits>
 
 namespace lumel {
 namespace {
@@ -25,12 +24,6 @@ T load(const std::uint8_t* p) {
   return value;
 }
 
-template <class T>
-float toFloat(const std::uint8_t* p, bool normalized) {
-  const auto value = static_cast<float>(load<T>(p));
-  return normalized ? std::max(value / static_cast<float>(std::numeric_limits<T>::max()), -1.0f) : value;
-}
-
 std::size_t sizeOfComponent(int componentType) {
   switch (componentType) {
     case TINYGLTF_COMPONENT_TYPE_BYTE:
@@ -41,6 +34,23 @@ std::size_t sizeOfComponent(int componentType) {
       return 2;
     default:
       return 4;
+  }
+}
+
+float componentToFloat(const std::uint8_t* p, int componentType) {
+  switch (componentType) {
+    case TINYGLTF_COMPONENT_TYPE_BYTE:
+      return load<std::int8_t>(p);
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return load<std::uint8_t>(p);
+    case TINYGLTF_COMPONENT_TYPE_SHORT:
+      return load<std::int16_t>(p);
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return load<std::uint16_t>(p);
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+      return static_cast<float>(load<std::uint32_t>(p));
+    default:
+      return load<float>(p);
   }
 }
 
@@ -135,20 +145,18 @@ Expected<void> applySparse(const GltfDocument& document, int index, const Elemen
 
 }  // namespace
 
-float componentToFloat(const std::uint8_t* p, int componentType, bool normalized) {
+float normalizedToFloat(float value, int componentType) {
   switch (componentType) {
     case TINYGLTF_COMPONENT_TYPE_BYTE:
-      return toFloat<std::int8_t>(p, normalized);
+      return std::max(value / 127.0f, -1.0f);
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return toFloat<std::uint8_t>(p, normalized);
+      return value / 255.0f;
     case TINYGLTF_COMPONENT_TYPE_SHORT:
-      return toFloat<std::int16_t>(p, normalized);
+      return std::max(value / 32767.0f, -1.0f);
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return toFloat<std::uint16_t>(p, normalized);
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-      return toFloat<std::uint32_t>(p, normalized);
+      return value / 65535.0f;
     default:
-      return load<float>(p);
+      return value;
   }
 }
 
@@ -186,9 +194,10 @@ Expected<void> readFloats(const GltfDocument& document, int index, int component
       std::memcpy(out + element * width, p, width * sizeof(float));
       return;
     }
-    for (std::size_t c = 0; c < width; ++c)
-      out[element * width + c] =
-          componentToFloat(p + c * layout->componentSize, accessor.componentType, accessor.normalized);
+    for (std::size_t c = 0; c < width; ++c) {
+      const float value = componentToFloat(p + c * layout->componentSize, accessor.componentType);
+      out[element * width + c] = accessor.normalized ? normalizedToFloat(value, accessor.componentType) : value;
+    }
   };
   if (layout->bytes.empty()) {
     std::fill(out, out + accessor.count * width, 0.0f);

@@ -35,7 +35,8 @@ Expected<std::vector<T>> readArray(const GltfDocument& document, int accessor) {
 /// Unsigned integers (vertex or joint indices), `components` per element.
 Expected<std::vector<std::uint32_t>> readIntegers(const GltfDocument& document, int accessor, int components = 1);
 
-/// One component of any glTF type at p, as glTF 2.0 section 3.6.2.2 converts it.
-float componentToFloat(const std::uint8_t* p, int componentType, bool normalized);
+/// The number in 0..1 or -1..1 that a normalised integer stands for (glTF 2.0, section 3.6.2.2). Components that
+/// cannot be normalised (32 bits) stay as they are.
+float normalizedToFloat(float value, int componentType);
 
 }  // namespace lumel

@@ -69,23 +69,6 @@ std::size_t AttributeReader::vertexCount() const {
   return draco_ ? draco_->vertexCount : document_.model.accessors[static_cast<std::size_t>(accessor("POSITION"))].count;
 }
 
-/// Draco hands integers over unscaled; the accessor says whether and how they are normalised.
-float rescale(float value, const tinygltf::Accessor& accessor) {
-  if (!accessor.normalized) return value;
-  switch (accessor.componentType) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE:
-      return std::max(value / 127.0f, -1.0f);
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return value / 255.0f;
-    case TINYGLTF_COMPONENT_TYPE_SHORT:
-      return std::max(value / 32767.0f, -1.0f);
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return value / 65535.0f;
-    default:
-      return value;
-  }
-}
-
 template <class T>
 Expected<std::vector<T>> AttributeReader::read(const std::string& name, std::size_t vertices) const {
   const std::string place = place_ + "/attributes/" + name;
@@ -95,7 +78,9 @@ Expected<std::vector<T>> AttributeReader::read(const std::string& name, std::siz
     const auto& format = document_.model.accessors[static_cast<std::size_t>(accessor(name))];
     std::vector<T> values(vertices);
     float* out = reinterpret_cast<float*>(values.data());
-    for (std::size_t i = 0; i < attribute->values.size(); ++i) out[i] = rescale(attribute->values[i], format);
+    // Draco hands integers over unscaled; the accessor says whether and how they are normalised.
+    for (std::size_t i = 0; i < attribute->values.size(); ++i)
+      out[i] = format.normalized ? normalizedToFloat(attribute->values[i], format.componentType) : attribute->values[i];
     return values;
   }
   const std::size_t count = document_.model.accessors[static_cast<std::size_t>(accessor(name))].count;

@@ -42,8 +42,6 @@ std::vector<std::uint32_t> triangulate(const std::vector<std::uint32_t>& in, int
 }
 
 std::optional<Error> checkPositions(const GltfDocument& document, const std::string& place, const Primitive& primitive) {
-  // Squares of larger distances overflow a float.
-  constexpr float kMaxCoordinate = 1e18f;
   for (std::size_t v = 0; v < primitive.positions.size(); ++v) {
     const Vec3& p = primitive.positions[v];
     if (!isFinite(p))
@@ -72,8 +70,8 @@ std::optional<Error> load(const GltfDocument& document, const MeshUse& use, cons
   auto indices = readAttributes(document, source, place, use, primitive, job.report);
   if (!indices) return indices.error();
   if (auto error = checkPositions(document, place, primitive)) return error;
-  if (use.hasBaked)
-    for (std::size_t v = 0; v < primitive.positions.size(); ++v) transformVertex(primitive, v, use.baked);
+  if (use.vertexTransform)
+    for (std::size_t v = 0; v < primitive.positions.size(); ++v) transformVertex(primitive, v, *use.vertexTransform);
   // Draco hands over a triangle list whatever the mode.
   const bool isList = source.mode == TINYGLTF_MODE_TRIANGLES || findExtension(source.extensions, "KHR_draco_mesh_compression");
   primitive.indices = triangulate(*indices, isList ? TINYGLTF_MODE_TRIANGLES : source.mode);

@@ -12,8 +12,6 @@
 namespace lumel {
 namespace {
 
-// Squares of larger distances overflow a float.
-constexpr double kMaxCoordinate = 1e18;
 constexpr std::size_t kMaxInstances = 50'000'000;
 
 std::string placeOf(std::size_t node) { return "nodes/" + std::to_string(node); }
@@ -41,7 +39,7 @@ glm::dmat4 parentFromNode(const tinygltf::Node& node) {
 
 bool isUsable(const glm::dmat4& m) {
   for (int i = 0; i < 16; ++i)
-    if (!(std::abs(m[i / 4][i % 4]) <= kMaxCoordinate)) return false;
+    if (!(std::abs(m[i / 4][i % 4]) <= double{kMaxCoordinate})) return false;
   return true;
 }
 
@@ -67,6 +65,7 @@ class NodeFlattener {
   Expected<std::vector<glm::dmat4>> instanceTransforms(std::size_t node) const;
   void addInstance(int mesh, const std::string& name, const glm::dmat4& world, const ObjectSettings& settings,
                    const std::vector<double>& weights);
+  int addUse(MeshUse use);
   int plainUse(int mesh);
   void addLight(std::size_t node, int light);
   void addCamera(std::size_t node);
@@ -162,12 +161,14 @@ Expected<std::vector<glm::dmat4>> NodeFlattener::instanceTransforms(std::size_t 
   return transforms;
 }
 
+int NodeFlattener::addUse(MeshUse use) {
+  uses_.push_back(std::move(use));
+  return static_cast<int>(uses_.size()) - 1;
+}
+
 int NodeFlattener::plainUse(int mesh) {
-  const auto [it, isNew] = plainUses_.try_emplace(mesh, static_cast<int>(uses_.size()));
-  if (isNew) {
-    uses_.emplace_back();
-    uses_.back().mesh = mesh;
-  }
+  const auto [it, isNew] = plainUses_.try_emplace(mesh, 0);
+  if (isNew) it->second = addUse({.mesh = mesh});
   return it->second;
 }
 
@@ -176,17 +177,11 @@ void NodeFlattener::addInstance(int mesh, const std::string& name, const glm::dm
   Instance instance;
   instance.name = name;
   instance.settings = settings;
-  if (!isInvertible(world)) {
-    uses_.push_back({mesh, weights, {}, true, Mat4(world)});
-    instance.mesh = static_cast<int>(uses_.size()) - 1;
-  } else {
+  if (isInvertible(world)) {
     instance.worldFromObject = Mat4(world);
-    if (weights.empty()) {
-      instance.mesh = plainUse(mesh);
-    } else {
-      uses_.push_back({mesh, weights, {}, false, Mat4(1.0f)});
-      instance.mesh = static_cast<int>(uses_.size()) - 1;
-    }
+    instance.mesh = weights.empty() ? plainUse(mesh) : addUse({.mesh = mesh, .weights = weights});
+  } else {
+    instance.mesh = addUse({.mesh = mesh, .weights = weights, .vertexTransform = Mat4(world)});
   }
   scene_.instances.push_back(std::move(instance));
 }
@@ -204,11 +199,10 @@ std::optional<Error> NodeFlattener::addMesh(std::size_t index) {
   if (node.skin >= 0) {
     auto joints = jointMatrices(document_, node.skin, worldFromNode_);
     if (!joints) return joints.error();
-    uses_.push_back({node.mesh, node.weights, *std::move(joints), false, Mat4(1.0f)});
     Instance instance;  // joints alone place a skinned mesh: its node's transform does not count
     instance.name = name;
     instance.settings = settings;
-    instance.mesh = static_cast<int>(uses_.size()) - 1;
+    instance.mesh = addUse({.mesh = node.mesh, .weights = node.weights, .jointMatrices = *std::move(joints)});
     scene_.instances.push_back(std::move(instance));
     return std::nullopt;
   }

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "scene/scene.h"
+
 namespace lumel {
 namespace {
 
@@ -51,7 +53,7 @@ std::optional<std::string> checkNumbers(std::string_view line, int kind) {
     double value = 0;
     const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), value);
     if (error != std::errc() || end != token.data() + token.size() || !std::isfinite(value) ||
-        std::abs(value) > 1e18)
+        std::abs(value) > double{kMaxCoordinate})
       return std::string("a ") + kKinds[static_cast<std::size_t>(kind)] + " with '" + std::string(token.substr(0, 40)) +
              "', which is not a finite number below 1e18";
   }

@@ -1,5 +1,5 @@
-// The scene as plain data: what every other room works on. Units: metres, candela, lux, nits (DESIGN conventions:
-// no photometric factor anywhere, a lux in is a lux out). Right-handed, y up, as glTF.
+// The scene as plain data: what every other room works on. Units: metres, candela, lux, nits (no photometric factor
+// anywhere: a lux in is a lux out). Right-handed, y up, as glTF.
 #pragma once
 
 #include <array>
@@ -13,6 +13,9 @@
 #include "scene/math.h"
 
 namespace lumel {
+
+/// Largest coordinate that loaders let through, in metres: squares of larger distances overflow a float.
+inline constexpr float kMaxCoordinate = 1e18f;
 
 /// A triangle list. Every array but `indices` has one entry per vertex or is empty.
 struct Primitive {
@@ -94,6 +97,11 @@ struct ImageSource {
 };
 
 enum class LightType { Point, Spot, Directional };
+
+/// As KHR_lights_punctual calls it: "point", "spot", "directional".
+inline const char* nameOf(LightType type) {
+  return type == LightType::Point ? "point" : type == LightType::Spot ? "spot" : "directional";
+}
 
 /// KHR_lights_punctual. Point and spot: intensity in candela (lm/sr); directional: lux on a facing surface.
 struct Light {
