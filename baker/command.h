@@ -32,6 +32,7 @@ struct Command {
 };
 
 Command bakeCommand();
+Command ssbumpCommand();
 Command renderCommand();
 Command infoCommand();
 Command diffCommand();

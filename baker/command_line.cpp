@@ -8,7 +8,6 @@
 
 #include "baker/config_file.h"
 #include "baker/help.h"
-#include "baker/ssbump_command.h"
 #include "baker/terminal_progress.h"
 #include "baker/version.h"
 

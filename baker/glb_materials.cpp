@@ -4,6 +4,7 @@
 #include <tuple>
 
 #include "scene/image_io.h"
+#include "scene/image_type.h"
 
 namespace lumel {
 namespace {
@@ -23,12 +24,9 @@ int wrapConstant(Wrap wrap) {
   return wrap == Wrap::Clamp ? kClampToEdge : wrap == Wrap::Mirror ? kMirroredRepeat : kRepeat;
 }
 
-std::string sniffMimeType(const std::vector<std::uint8_t>& bytes) {
-  const auto at = [&](std::size_t i) { return i < bytes.size() ? bytes[i] : 0; };
-  if (at(0) == 0x89 && at(1) == 'P' && at(2) == 'N' && at(3) == 'G') return "image/png";
-  if (at(0) == 0xFF && at(1) == 0xD8 && at(2) == 0xFF) return "image/jpeg";
-  if (at(0) == 'R' && at(1) == 'I' && at(8) == 'W' && at(9) == 'E' && at(10) == 'B') return "image/webp";
-  return "";
+/// Whether a GLB may hold images of this type (glTF 2.0, EXT_texture_webp).
+bool isGlbImageType(const std::string& mimeType) {
+  return mimeType == "image/png" || mimeType == "image/jpeg" || mimeType == "image/webp";
 }
 
 class MaterialWriter {
@@ -147,9 +145,9 @@ class MaterialWriter {
 
   int addImage(const ImageSource& image) {
     if (image.encoded.empty()) return -1;
-    std::string mimeType = sniffMimeType(image.encoded);
+    std::string mimeType = imageMimeType(image.encoded);
     int view = -1;
-    if (!mimeType.empty()) {
+    if (isGlbImageType(mimeType)) {
       view = buffer_.addBytes(image.encoded);
     } else {
       const auto decoded = readImage(image.encoded, image.name);

@@ -1,6 +1,5 @@
 // lumel info: what a scene, a bake or an image holds.
 #include <algorithm>
-#include <cctype>
 #include <memory>
 #include <ostream>
 
@@ -96,16 +95,10 @@ Expected<Json> describeBakeFolder(const fs::path& dir) {
   return out;
 }
 
-bool isScene(const fs::path& file) {
-  std::string extension = file.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension == ".gltf" || extension == ".glb" || extension == ".obj";
-}
-
 Expected<Json> describe(const InfoArguments& a) {
   std::error_code ec;
   if (fs::is_directory(a.file, ec)) return describeBakeFolder(a.file);
-  if (!isScene(a.file)) return describeImage(a.file);
+  if (!isSceneFile(a.file)) return describeImage(a.file);
   const auto scene = loadScene(a.file, {.allowOutsidePaths = a.allowOutsidePaths});
   if (!scene) return scene.error();
   Json out = {{"kind", "scene"}, {"file", a.file.string()}};

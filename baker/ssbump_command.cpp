@@ -4,8 +4,10 @@
 #include <cstdio>
 #include <memory>
 
-#include "baker/ssbump_command.h"
+#include "baker/command.h"
+#include "scene/file_access.h"
 #include "scene/file_set.h"
+#include "scene/load_scene.h"
 #include "scene/parallel.h"
 #include "ssbump/basis_file.h"
 #include "ssbump/contact_sheet.h"
@@ -153,15 +155,6 @@ void tell(const CommandContext& context, const BakeReport& report) {
   for (const std::string& warning : report.warnings) std::fprintf(stderr, "warning: %s\n", warning.c_str());
 }
 
-bool hasExtension(const fs::path& file, std::initializer_list<std::string_view> extensions) {
-  std::string e = file.extension().string();
-  for (char& c : e)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return std::find(extensions.begin(), extensions.end(), e) != extensions.end();
-}
-
-bool isMesh(const fs::path& file) { return hasExtension(file, {".gltf", ".glb", ".obj"}); }
-
 Expected<void> runMesh(const SsbumpArguments& a, CommandContext& context) {
   auto maps = mapSettings(a);
   if (!maps) return maps.error();
@@ -195,13 +188,13 @@ Expected<void> runStudy(const SsbumpArguments& a, const BakeSettings& settings, 
 
 /// An option that would change nothing is a mistake: whoever gives it expects something else than would come.
 Expected<void> checkUse(const SsbumpArguments& a, const OptionTable& options) {
-  const bool convert = a.convert || !a.crossFade.empty(), mesh = !convert && isMesh(a.input),
+  const bool convert = a.convert || !a.crossFade.empty(), mesh = !convert && isSceneFile(a.input),
              heights = !convert && !mesh, rays = mesh || (heights && a.method == BackEnd::Rays);
   const MapFiles& save = a.save;
   bool dds = false;
   for (const fs::path* file :
        {&a.output, &save.weights, &save.occlusion, &save.ambient, &save.normal, &save.recovered})
-    dds = dds || hasExtension(*file, {".dds"});
+    dds = dds || lowerCaseExtension(*file) == ".dds";
   struct Rule {
     bool holds;
     const char* with;
@@ -255,7 +248,7 @@ Expected<void> runSsbump(const SsbumpArguments& a, CommandContext& context) {
   if (auto good = checkPlaces(a); !good) return good;
   const ThreadLimit limit(a.threads);
   if (a.convert || !a.crossFade.empty()) return runConvert(a, context.progress);
-  if (isMesh(a.input)) return runMesh(a, context);
+  if (isSceneFile(a.input)) return runMesh(a, context);
   auto settings = bakeSettings(a);
   if (!settings) return settings.error();
   if (!a.study.empty())

@@ -1,5 +1,6 @@
 #include "scene/file_access.h"
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cerrno>
@@ -49,6 +50,13 @@ bool isInside(const fs::path& file, const fs::path& folder) {
 }
 
 }  // namespace
+
+std::string lowerCase(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+std::string lowerCaseExtension(const fs::path& file) { return lowerCase(file.extension().string()); }
 
 Expected<std::vector<std::uint8_t>> readFile(const fs::path& file) {
   std::error_code ec;

@@ -16,6 +16,7 @@
 #include <system_error>
 
 #include "scene/check.h"
+#include "scene/image_type.h"
 
 namespace lumel {
 namespace {
@@ -93,31 +94,21 @@ Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& nam
   return loaded;
 }
 
-/// The extension chooses the decoder: OpenImageIO tries all readers only for files on disk.
-const char* formatOf(std::span<const std::uint8_t> encoded) {
-  const auto startsWith = [&](std::initializer_list<int> magic, std::size_t at = 0) {
-    if (encoded.size() < at + magic.size()) return false;
-    std::size_t i = at;
-    for (int m : magic)
-      if (encoded[i++] != m) return false;
-    return true;
-  };
-  return startsWith({0x89, 'P', 'N', 'G'})                                          ? "png"
-         : startsWith({0xFF, 0xD8})                                                 ? "jpeg"
-         : startsWith({'R', 'I', 'F', 'F'}) && startsWith({'W', 'E', 'B', 'P'}, 8) ? "webp"
-         : startsWith({0x76, 0x2F, 0x31, 0x01})                                     ? "openexr"
-         : startsWith({'D', 'D', 'S', ' '})                                         ? "dds"
-         : startsWith({'B', 'M'})                                                   ? "bmp"
-         : startsWith({'#', '?'})                                                   ? "hdr"
-         : startsWith({'I', 'I', 42, 0}) || startsWith({'M', 'M', 0, 42})           ? "tiff"
-                                                                                    : "targa";
+/// An extension for encoded bytes, since OpenImageIO chooses the decoder of an image in memory by its name.
+std::string extensionFor(std::span<const std::uint8_t> encoded) {
+  const std::string mimeType = imageMimeType(encoded);
+  if (mimeType.empty()) return "tga";
+  if (mimeType == "image/x-exr") return "exr";
+  if (mimeType == "image/vnd.radiance") return "hdr";
+  if (mimeType == "image/vnd-ms.dds") return "dds";
+  return mimeType.substr(mimeType.find('/') + 1);
 }
 
 }  // namespace
 
 std::array<int, 2> imageSize(std::span<const std::uint8_t> encoded) {
   OIIO::Filesystem::IOMemReader memory(const_cast<std::uint8_t*>(encoded.data()), encoded.size());
-  const auto input = OIIO::ImageInput::open(std::string("memory.") + formatOf(encoded), nullptr, &memory);
+  const auto input = OIIO::ImageInput::open("memory." + extensionFor(encoded), nullptr, &memory);
   if (!input) {
     OIIO::geterror();  // or it would be printed at exit
     return {0, 0};
@@ -156,15 +147,15 @@ Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std
   std::copy_n(encoded.begin(), std::min(encoded.size(), head.size()), head.begin());
   if (isPng(head) && !isWholePng(encoded.size(), read)) return cutOff(name);
   OIIO::Filesystem::IOMemReader memory(const_cast<std::uint8_t*>(encoded.data()), encoded.size());
-  const char* format = formatOf(encoded);
+  const std::string extension = extensionFor(encoded);
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
-  auto input = OIIO::ImageInput::open(std::string("memory.") + format, &config, &memory);
+  auto input = OIIO::ImageInput::open("memory." + extension, &config, &memory);
   if (input) return readOpened(*input, name, head);
   // Readers without memory support go through a temporary file.
   static std::atomic<int> counter{0};
   const auto file = std::filesystem::temp_directory_path() /
-                    ("lumel-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + "." + format);
+                    ("lumel-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + "." + extension);
   const std::string_view bytes(reinterpret_cast<const char*>(encoded.data()), encoded.size());
   if (writeBytes({name, file}, bytes)) input = OIIO::ImageInput::open(file.string(), &config);
   auto result = input ? readOpened(*input, name, head) : unreadable(name, OIIO::geterror());
@@ -175,7 +166,7 @@ Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std
 
 namespace {
 
-/// A file that remembers what went wrong: some encoders (PNG's above all) do not tell when the disk is full.
+/// Remembers the first error of the system: some encoders (PNG's above all) do not report a full disk.
 class CheckedFile : public OIIO::Filesystem::IOFile {
  public:
   explicit CheckedFile(std::FILE* file) : IOFile(file, Write) {}
@@ -273,7 +264,7 @@ Expected<void> ImageWriter::write(const Image& rows, const Progress& progress) {
   }
   for (int y = 0; y < rows.height; y += kRowsAtOnce) {
     if (progress.cancelled()) return interrupted();
-    // With the first rows: libpng complains aloud about a file without any.
+    // Not before the first rows: libpng complains on standard error about a file without any.
     if (s.nextRow == 0 && (!s.output->set_ioproxy(s.bytes.get()) || !s.output->open(s.file.path.string(), s.spec)))
       return s.failed();
     const int count = std::min(kRowsAtOnce, rows.height - y);

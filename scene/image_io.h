@@ -34,7 +34,7 @@ Expected<LoadedImage> readImage(const std::filesystem::path& file, const Progres
 /// The same from encoded bytes in memory (glTF images: PNG, JPEG, WebP, ...). `name` is for messages.
 Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std::string& name);
 
-/// Width and height from an image's head alone; 0 x 0 where it cannot be read from memory.
+/// Width and height from an image's header alone; 0 x 0 if it cannot be read from memory.
 std::array<int, 2> imageSize(std::span<const std::uint8_t> encoded);
 
 enum class PixelFormat { U8, U16, Half, Float };

@@ -12,6 +12,9 @@ struct LoadOptions {
   bool allowOutsidePaths = false;  // buffers and images outside the scene's folder
 };
 
+/// By extension, whatever its case: .gltf, .glb or .obj.
+bool isSceneFile(const std::filesystem::path& file);
+
 /// Loads by extension. Errors: Input, one line naming file and place ("level.gltf: accessors/12: ...").
 /// A missing or unreadable texture is a warning in Scene::report; a missing buffer is an error.
 Expected<Scene> loadScene(const std::filesystem::path& file, const LoadOptions& options = {});

@@ -33,14 +33,6 @@ class ObjMaterialLoader {
   std::map<std::string, int> images_;  // file -> scene.images; also those that are missing
 };
 
-bool isTga(const std::string& file) {
-  const auto dot = file.rfind('.');
-  std::string extension = dot == std::string::npos ? "" : file.substr(dot);
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension == ".tga";
-}
-
 /// The image's index; a missing one has an index too, and no bytes. Each file is read (and warned of) once.
 Expected<int> ObjMaterialLoader::image(const std::string& file) {
   if (const auto it = images_.find(file); it != images_.end()) return it->second;
@@ -54,7 +46,7 @@ Expected<int> ObjMaterialLoader::image(const std::string& file) {
   if (auto bytes = readFile(*path)) {
     source.encoded = *std::move(bytes);
     source.mimeType = imageMimeType(source.encoded);
-    if (source.mimeType.empty() && isTga(file)) source.mimeType = "image/x-tga";
+    if (source.mimeType.empty() && lowerCaseExtension(file) == ".tga") source.mimeType = "image/x-tga";
     if (source.mimeType.empty()) {
       warn("MTL: '" + file + "' is not an image of a known type; the material's colour applies alone");
       source.encoded.clear();

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "scene/file_access.h"
 #include "scene/parallel.h"
 
 namespace lumel::ssbump {
@@ -17,17 +18,6 @@ namespace {
 constexpr double kMaxHeightTexels = 1e6;
 
 constexpr std::size_t kTexelsAtOnce = 1 << 16;
-
-int wrapIndex(int i, int size) {
-  i %= size;
-  return i < 0 ? i + size : i;
-}
-
-std::string lowerCase(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
 
 }  // namespace
 

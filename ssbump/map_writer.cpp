@@ -3,17 +3,11 @@
 #include <algorithm>
 
 #include "scene/check.h"
+#include "scene/file_access.h"
 #include "ssbump/weights.h"
 
 namespace lumel::ssbump {
 namespace {
-
-std::string extensionOf(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  for (char& c : extension)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return extension;
-}
 
 PixelFormat formatFor(const std::string& extension, const MapOptions& options) {
   return options.format.value_or(extension == ".exr" ? PixelFormat::Half : PixelFormat::U8);
@@ -61,7 +55,7 @@ Expected<MapWriter> MapWriter::open(FileSet& files, const std::filesystem::path&
                                     int channels, MapKind kind, const MapOptions& options,
                                     std::vector<std::string> channelNames,
                                     std::map<std::string, std::string> metadata) {
-  const std::string extension = extensionOf(file);
+  const std::string extension = lowerCaseExtension(file);
   MapWriter writer;
   writer.width_ = width;
   writer.height_ = height;

@@ -120,6 +120,18 @@ TEST(ImageIo, IndexedColoursAreNamed) {
   EXPECT_FALSE(readImage(*png, "rgb.png")->paletted);
 }
 
+/// A texture of a type that the loaders let through must also be decodable: the type is told by the bytes alone.
+TEST(ImageIo, GifInMemoryIsRead) {
+  // One white pixel: header, a palette of two, an image of one LZW block.
+  const std::vector<std::uint8_t> gif = {'G',  'I', 'F', '8', '9', 'a', 1, 0, 1, 0, 0x80, 0, 0, 0xFF, 0xFF, 0xFF, 0, 0,
+                                         0, ',', 0,   0,   0,   0,   1, 0, 1, 0, 0,    2, 2, 0x44, 1,    0,    ';'};
+  auto image = readImage(gif, "pixel.gif");
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_EQ(image->format, "gif");
+  EXPECT_TRUE(image->paletted);
+  EXPECT_EQ(image->image.rgb(0, 0), Vec3(1.0f));
+}
+
 TEST(ImageIo, HalfOverflowAndNanFailLoudlyAndLeaveNoFile) {
   Image image(2, 1, 3, 1.0f);
   image.pixels[4] = 70000.0f;
