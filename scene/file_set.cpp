@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kPrefix = ".lumel-";
 constexpr const char* kSuffix = ".part";
-// Folders in the hidden one for the files that new ones replace; the second for the one that tells readers.
+// Folders in the hidden one for files that are replaced; the second for the one that marks a folder as a result.
 constexpr const char* kOld = "old";
 constexpr const char* kOldLast = "old-last";
 
@@ -105,11 +105,11 @@ void FileSet::recover(const fs::path& dir) {
   }
 }
 
-Expected<void> FileSet::commit(bool tellsLast, const std::function<bool(const std::string& name)>& ours) {
+Expected<void> FileSet::commit(bool lastIsMark, const std::function<bool(const std::string& name)>& ours) {
   for (const PendingFile& file : files_)
     if (auto flushed = flush(file); !flushed) return flushed;
   std::vector<Step> done;
-  auto exchanged = exchange(tellsLast, ours, done);
+  auto exchanged = exchange(lastIsMark, ours, done);
   std::error_code ec;
   for (auto step = done.rbegin(); !exchanged && step != done.rend(); ++step) {
     if (step->old.empty())
@@ -121,7 +121,7 @@ Expected<void> FileSet::commit(bool tellsLast, const std::function<bool(const st
   return exchanged;
 }
 
-Expected<void> FileSet::exchange(bool tellsLast, const std::function<bool(const std::string& name)>& ours,
+Expected<void> FileSet::exchange(bool lastIsMark, const std::function<bool(const std::string& name)>& ours,
                                  std::vector<Step>& done) const {
   if (files_.empty()) return {};
   std::error_code ec;
@@ -137,7 +137,7 @@ Expected<void> FileSet::exchange(bool tellsLast, const std::function<bool(const 
   };
   const PendingFile& last = files_.back();
   const fs::path hidden = last.path.parent_path(), dir = folderOf(last.place);
-  if (tellsLast && fs::is_regular_file(last.place, ec))
+  if (lastIsMark && fs::is_regular_file(last.place, ec))
     if (auto moved = setAside(last.place, hidden / kOldLast, false); !moved) return moved;
   if (ours)
     for (const fs::path& file : filesIn(dir)) {

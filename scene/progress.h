@@ -1,4 +1,4 @@
-// How long work tells the outside that it advances, and learns that it should stop.
+// How long work reports progress and learns that it should stop.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ class Progress {
   virtual void begin(std::string_view /*stage*/, std::uint64_t /*totalWork*/) {}
   virtual void advance(std::uint64_t /*work*/) {}
   virtual void end() {}
-  /// True once the user asked to stop; work in hand returns interrupted() at its next convenient point.
+  /// True once the user asked to stop; work in progress returns interrupted() at its next convenient point.
   virtual bool cancelled() const { return false; }
 };
 
