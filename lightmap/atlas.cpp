@@ -1,7 +1,6 @@
 #include "lightmap/atlas.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 
@@ -12,13 +11,10 @@
 #include "lightmap/scene_uvs.h"
 #include "lightmap/uv_rounding.h"
 #include "scene/parallel.h"
+#include "scene/stopwatch.h"
 
 namespace lumel {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 std::string figures(const UvReport& r) {
   if (!r.present) return "has no TEXCOORD_1";
@@ -82,11 +78,8 @@ class AtlasBuilder {
       if (placed_[i].empty()) continue;
       const double surface = weightedArea(scene_, scene_.instances[i]);
       double texels = 0;
-      for (const PlacedTriangle& t : placed_[i]) {
-        const Vec2d e1 = Vec2d(t.uvs[1]) - Vec2d(t.uvs[0]);
-        const Vec2d e2 = Vec2d(t.uvs[2]) - Vec2d(t.uvs[0]);
-        texels += 0.5 * std::abs(e1.x * e2.y - e1.y * e2.x) * options_.pageSize * options_.pageSize;
-      }
+      for (const PlacedTriangle& t : placed_[i])
+        texels += triangleArea(Vec2d(t.uvs[0]), t.uvs[1], t.uvs[2]) * options_.pageSize * options_.pageSize;
       sum += texels;
       area += surface;
     }
@@ -104,7 +97,7 @@ class AtlasBuilder {
                                     : static_cast<double>(options_.texelsPerMeter);
     if (!(area > 0) || !std::isfinite(density)) return {};  // nothing has a surface
 
-    const auto chartStart = Clock::now();
+    const Stopwatch chartTime;
     UnwrapOptions unwrapOptions;
     unwrapOptions.maxStretch = static_cast<double>(options_.maxStretch);
     const int border = 2 * ((options_.padding + 1) / 2);
@@ -114,16 +107,16 @@ class AtlasBuilder {
     progress_.end();
     if (progress_.cancelled()) return interrupted();
     AtlasReport& report = result_.report;
-    report.chartSeconds = secondsSince(chartStart);
+    report.chartSeconds = chartTime.seconds();
 
-    const auto packStart = Clock::now();
+    const Stopwatch packTime;
     const std::vector<std::uint64_t> keys = chartKeys(scene_, objects);
     KeptLayout kept;
     if (earlier) kept = {earlier->scale, recall(*earlier, keys)};
     Expected<ChartPlaces> places =
         placeCharts(objects, options_, sceneDensity_ / density, earlier ? &kept : nullptr, progress_);
     if (!places) return places.error();
-    report.packSeconds = secondsSince(packStart);
+    report.packSeconds = packTime.seconds();
     result_.atlas.texelsPerMeter = static_cast<float>(density * places->scale);
     result_.atlas.chartDensity = density;
     result_.atlas.chartScale = places->scale;
@@ -195,9 +188,7 @@ class AtlasBuilder {
             triangle.uvs[corner] = uvs[chart.corners[t][k]];
             corners[k] = Vec2d(triangle.uvs[corner]) * size;
           }
-          const Vec2d e1 = corners[1] - corners[0];
-          const Vec2d e2 = corners[2] - corners[0];
-          const double area = 0.5 * std::abs(e1.x * e2.y - e1.y * e2.x);
+          const double area = triangleArea(corners[0], corners[1], corners[2]);
           texels += area;
           keptTexels += place.kept ? area : 0.0;
           placed.push_back(triangle);

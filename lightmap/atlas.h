@@ -28,8 +28,8 @@ struct AtlasOptions {
   int padding = 2;              // texels between charts, at least, and to the page's border half of it
   float maxStretch = 1.25f;     // a chart is split where its largest singular value (relative to uniform) exceeds this
   int blockAlign = 0;           // no block of so many texels a side holds two charts (4 for block compression); 0 = off
-  // An earlier layout: generated charts that did not change stay where they were, at the density of then. It is not used
-  // where density (if given), page size, padding, blocks or stretch are others now.
+  // An earlier layout: generated charts that did not change stay where they were, at its density. Not used if density
+  // (where given), page size, padding, blocks or stretch differ from it.
   std::shared_ptr<const RememberedLayout> layout = {};
 };
 
@@ -53,7 +53,7 @@ struct AtlasReport {
   std::size_t keptCharts = 0;   // of these: where they were in AtlasOptions::layout
   double keptShare = 0.0;       // of the surface with generated charts
   std::size_t nonManifoldEdges = 0;
-  std::size_t degenerateTriangles = 0;  // placed as zero-area charts' worth of nothing: they get no texels
+  std::size_t degenerateTriangles = 0;  // without area: they are in no chart and get no texels
   double chartSeconds = 0.0;
   double packSeconds = 0.0;
 };

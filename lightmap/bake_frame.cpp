@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
+#include <tuple>
 
 namespace lumel {
 namespace {
 
 struct FrameVertex {  // a vertex of one chart, with what its triangles say
-  std::array<std::uint32_t, 4> key;  // chart, position
+  std::uint32_t chart;
+  std::array<std::uint32_t, 3> position;  // bitsOf
   Vec2 uv;
   std::uint32_t surface;
   std::uint32_t vertex;
@@ -16,12 +17,13 @@ struct FrameVertex {  // a vertex of one chart, with what its triangles say
   double handedness = 0.0;
 
   bool operator<(const FrameVertex& o) const {
-    return std::tie(key, uv.x, uv.y, surface, vertex) < std::tie(o.key, o.uv.x, o.uv.y, o.surface, o.vertex);
+    return std::tie(chart, position, uv.x, uv.y, surface, vertex) <
+           std::tie(o.chart, o.position, o.uv.x, o.uv.y, o.surface, o.vertex);
   }
   /// Whether both are copies of one point of the chart: a thousandth of a texel apart is rounding.
   bool meets(const FrameVertex& o) const {
     constexpr float kSamePlace = 1e-6f;
-    return key == o.key && std::abs(uv.x - o.uv.x) <= kSamePlace && std::abs(uv.y - o.uv.y) <= kSamePlace;
+    return chart == o.chart && position == o.position && std::abs(uv.x - o.uv.x) <= kSamePlace && std::abs(uv.y - o.uv.y) <= kSamePlace;
   }
 };
 
@@ -62,11 +64,8 @@ void setMaterialFrames(const Primitive& primitive, const Mat4& worldFromObject, 
 /// The surface's vertices with the sums of dP/du over their triangles.
 void addFrameVertices(const Surface& surface, std::uint32_t index, std::vector<FrameVertex>& vertices) {
   const std::size_t base = vertices.size();
-  for (std::uint32_t i = 0; i < surface.positions.size(); ++i) {
-    const Vec3 p = surface.positions[i] + 0.0f;
-    vertices.push_back({{0, std::bit_cast<std::uint32_t>(p.x), std::bit_cast<std::uint32_t>(p.y), std::bit_cast<std::uint32_t>(p.z)},
-                        surface.lightmapUvs[i], index, i});
-  }
+  for (std::uint32_t i = 0; i < surface.positions.size(); ++i)
+    vertices.push_back({0, bitsOf(surface.positions[i]), surface.lightmapUvs[i], index, i});
   for (std::size_t t = 0; t < surface.triangleCount(); ++t) {
     std::array<Vec3d, 3> p;
     std::array<Vec2d, 3> uv;
@@ -74,7 +73,7 @@ void addFrameVertices(const Surface& surface, std::uint32_t index, std::vector<F
     for (std::size_t k = 0; k < 3; ++k) {
       p[k] = surface.positions[v[k]];
       uv[k] = surface.lightmapUvs[v[k]];
-      vertices[base + v[k]].key[0] = surface.charts[t];
+      vertices[base + v[k]].chart = surface.charts[t];
     }
     Vec3d tangent;
     double hand = 0;

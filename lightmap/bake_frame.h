@@ -7,6 +7,9 @@
 
 namespace lumel {
 
+/// Tangents that are further apart than this (5 degrees) break the frame: a consumer would see it.
+inline constexpr float kSameFrameCos = 0.9962f;
+
 /// Whether the primitive's material sets the frame: it gives tangents, from the file or made for a normal map.
 bool hasMaterialFrame(const Primitive& primitive);
 

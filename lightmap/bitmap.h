@@ -33,7 +33,7 @@ class Bitmap {
   void clearSpan(int y, int x0, int x1);
 
   std::size_t count() const;
-  /// Equal for equal bitmaps; different ones differ but for chance.
+  /// Equal for equal bitmaps; nearly always different for others.
   std::uint64_t hash() const;
 
   /// Calls run(x0, x1) for each maximal run of set cells [x0, x1) of row y, left to right.

@@ -106,10 +106,7 @@ class Placer {
     for (std::size_t i = 0; i < shapes.size(); ++i) {
       if (!kept.charts[i]) continue;
       double area = 0;
-      for (const auto& t : shapes[i].triangles) {
-        const Vec2d e1(t[1] - t[0]), e2(t[2] - t[0]);
-        area += 0.5 * std::abs(e1.x * e2.y - e1.y * e2.x);
-      }
+      for (const auto& t : shapes[i].triangles) area += triangleArea(Vec2d(t[0]), t[1], t[2]);
       areas.emplace_back(-area, i);
       sum += area;
     }

@@ -11,7 +11,7 @@
 
 namespace lumel {
 
-/// Charts for a density that is still searched are kept this much smaller than the page, so that it may grow.
+/// While the density is searched, charts are made this much smaller than the page, so that they can still be scaled up.
 inline constexpr double kSearchHeadroom = 0.8;
 
 /// Density at which `area` square metres fill a page about half.
@@ -41,8 +41,8 @@ struct ChartPlaces {
   double scale = 1.0;                      // found: multiplies the density that objects were laid out for
 };
 
-/// Places that charts had before, and the scale of then. Where one page must hold all and does not so, only the largest
-/// charts are kept, and if that does not help either, there is a new search.
+/// Where charts were in an earlier bake, and its scale. If all must fit one page and do not with every kept chart in its
+/// place, only the largest keep theirs; if that fails too, all are placed anew.
 struct KeptLayout {
   double scale = 1.0;
   std::vector<std::optional<KeptPlace>> charts;  // in the order of ChartPlaces::charts

@@ -1,4 +1,4 @@
-// What of an atlas is worth remembering for the next bake of an edited scene: which chart lay where.
+// The layout of an atlas as the next bake of an edited scene needs it: which chart was where.
 #pragma once
 
 #include <cstdint>

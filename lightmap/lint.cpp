@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <tuple>
 
+#include "lightmap/bake_frame.h"
 #include "lightmap/raster.h"
 #include "lightmap/texels.h"
 #include "lightmap/uv_points.h"
@@ -15,7 +16,6 @@
 namespace lumel {
 namespace {
 
-constexpr float kFrameCos = 0.9962f;         // 5 degrees
 constexpr double kDensityTolerance = 0.25;
 constexpr double kFarTexels = 4.0;           // a slit of less blurs a detail that a lightmap does not hold
 constexpr double kFloatUvStep = 6e-8;        // of the page's side
@@ -40,14 +40,12 @@ Corners texelCorners(const Atlas& atlas, const Surface& surface, std::size_t tri
   return p;
 }
 
-double signedArea(const Corners& p) {
-  return -0.5 * ((p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x));  // rows run down
-}
+/// Positive where the triangle is counter-clockwise as seen: rows run down.
+double seenArea(const Corners& p) { return -signedArea(p[0], p[1], p[2]); }
 
 double worldArea(const Surface& surface, std::size_t triangle) {
   const std::uint32_t* v = &surface.indices[3 * triangle];
-  const Vec3d a(surface.positions[v[0]]);
-  return 0.5 * glm::length(glm::cross(Vec3d(surface.positions[v[1]]) - a, Vec3d(surface.positions[v[2]]) - a));
+  return triangleArea(Vec3d(surface.positions[v[0]]), surface.positions[v[1]], surface.positions[v[2]]);
 }
 
 class Linter {
@@ -85,8 +83,14 @@ class Linter {
   }
 
   void measureTriangles() {
-    LintFinding outside{"out-of-range", "vertices with lightmap UVs outside 0..1 or not finite", LintLevel::Error, 0, 0, "vertices", {}, -1, 0, 0, 0};
-    LintFinding lost{"lost", "triangles with a surface whose lightmap UVs have no area", LintLevel::Warning, 0, 0, "triangles", {}, -1, 0, 0, 0};
+    LintFinding outside{.id = "out-of-range",
+                        .meaning = "vertices with lightmap UVs outside 0..1 or not finite",
+                        .level = LintLevel::Error,
+                        .unit = "vertices"};
+    LintFinding lost{.id = "lost",
+                     .meaning = "triangles with a surface whose lightmap UVs have no area",
+                     .level = LintLevel::Warning,
+                     .unit = "triangles"};
     for (std::size_t s = 0; s < atlas_.surfaces.size(); ++s) {
       const Surface& surface = atlas_.surfaces[s];
       const Page& page = atlas_.pages[static_cast<std::size_t>(surface.page)];
@@ -101,7 +105,7 @@ class Linter {
       for (std::size_t t = 0; t < surface.triangleCount(); ++t) {
         const Corners p = texelCorners(atlas_, surface, t);
         const double area = worldArea(surface, t);
-        const double texels = signedArea(p);
+        const double texels = seenArea(p);
         ChartFigures& chart = charts_[surface.charts[t]];
         if (chart.surfaceIndex < 0) {
           chart.surfaceIndex = static_cast<int>(s);
@@ -124,7 +128,10 @@ class Linter {
 
   /// A triangle that turns against most of its chart; a chart that turns as a whole is mirrored.
   void addFlips() {
-    LintFinding flips{"flip", "triangles turned over within their chart", LintLevel::Error, 0, 0, "triangles", {}, -1, 0, 0, 0};
+    LintFinding flips{.id = "flip",
+                      .meaning = "triangles turned over within their chart",
+                      .level = LintLevel::Error,
+                      .unit = "triangles"};
     for (std::size_t s = 0; s < atlas_.surfaces.size(); ++s) {
       const Surface& surface = atlas_.surfaces[s];
       const Page& page = atlas_.pages[static_cast<std::size_t>(surface.page)];
@@ -134,7 +141,7 @@ class Linter {
         double longest = 0;
         for (std::size_t k = 0; k < 3; ++k) longest = std::max(longest, glm::length(p[(k + 1) % 3] - p[k]));
         const double noise = 4 * kFloatUvStep * std::max(page.width, page.height) * longest;
-        const double texels = signedArea(p) * (charts_[surface.charts[t]].signedTexels < 0 ? -1.0 : 1.0);
+        const double texels = seenArea(p) * (charts_[surface.charts[t]].signedTexels < 0 ? -1.0 : 1.0);
         if (texels >= -noise) continue;
         ++flips.count;
         setWorst(flips, -texels, static_cast<int>(s), p[0]);
@@ -190,18 +197,14 @@ class Linter {
 
   /// Numbers for the vertices of all surfaces, in their order: equal where chart, position and UV are.
   std::vector<std::uint32_t> pointNumbers() const {
-    using Key = std::array<std::uint32_t, 6>;
+    using Key = std::tuple<std::uint32_t, std::array<std::uint32_t, 3>, std::array<std::uint32_t, 2>>;
     std::vector<std::pair<Key, std::uint32_t>> vertices;
     for (const Surface& surface : atlas_.surfaces) {
       std::vector<std::uint32_t> chartOf(surface.positions.size(), 0);
       for (std::size_t i = 0; i < surface.indices.size(); ++i) chartOf[surface.indices[i]] = surface.charts[i / 3];
-      for (std::size_t i = 0; i < surface.positions.size(); ++i) {
-        const Vec3 p = surface.positions[i] + 0.0f;
-        const Vec2 uv = surface.lightmapUvs[i] + 0.0f;
-        vertices.push_back({{chartOf[i], std::bit_cast<std::uint32_t>(p.x), std::bit_cast<std::uint32_t>(p.y), std::bit_cast<std::uint32_t>(p.z),
-                             std::bit_cast<std::uint32_t>(uv.x), std::bit_cast<std::uint32_t>(uv.y)},
+      for (std::size_t i = 0; i < surface.positions.size(); ++i)
+        vertices.push_back({{chartOf[i], bitsOf(surface.positions[i]), bitsOf(surface.lightmapUvs[i])},
                             static_cast<std::uint32_t>(vertices.size())});
-      }
     }
     std::sort(vertices.begin(), vertices.end());
     std::vector<std::uint32_t> numbers(vertices.size(), 0);
@@ -240,7 +243,7 @@ class Linter {
       const auto breaks = [&](std::uint32_t v, std::uint32_t w) {
         const Vec4 t = of.tangents[v];
         const Vec4 u = other.tangents[w];
-        return t.w != u.w || glm::dot(Vec3(t), Vec3(u)) < kFrameCos;
+        return t.w != u.w || glm::dot(Vec3(t), Vec3(u)) < kSameFrameCos;
       };
       if (!breaks(a.atLow, b.atLow) && !breaks(a.atHigh, b.atHigh)) continue;
       charts_[a.chart].crossesFrame = true;
@@ -249,7 +252,11 @@ class Linter {
 
   /// Texels whose parts are of one chart but far apart on the surface.
   void findMixedTexels() {
-    LintFinding mixed{"self-mixing", "texels that mix places of a chart more than four texels apart on the surface", LintLevel::Warning, 0, report_.coveredTexels, "texels", {}, -1, 0, 0, 0};
+    LintFinding mixed{.id = "self-mixing",
+                      .meaning = "texels that mix places of a chart more than four texels apart on the surface",
+                      .level = LintLevel::Warning,
+                      .total = report_.coveredTexels,
+                      .unit = "texels"};
     const std::vector<PageTexels> pages = findTexels(atlas_);
     for (const PageTexels& page : pages) {
       std::vector<double> apart(page.size(), 0.0);  // texels
@@ -289,7 +296,11 @@ class Linter {
 
   template <class Test, class Value>
   void addCharts(const char* id, const char* meaning, LintLevel level, Test test, Value value) {
-    LintFinding finding{id, meaning, level, 0, static_cast<double>(charts_.size()), "charts", {}, -1, 0, 0, 0};
+    LintFinding finding{.id = id,
+                        .meaning = meaning,
+                        .level = level,
+                        .total = static_cast<double>(charts_.size()),
+                        .unit = "charts"};
     for (const ChartFigures& chart : charts_) {
       if (chart.surfaceIndex < 0 || !test(chart)) continue;
       ++finding.count;
@@ -304,7 +315,11 @@ class Linter {
       surface += chart.surface;
       texels += chart.texels;
     }
-    LintFinding overlap{"overlap", "texels' area covered more than once", LintLevel::Error, 0, texels, "texels", {}, -1, 0, 0, 0};
+    LintFinding overlap{.id = "overlap",
+                        .meaning = "texels' area covered more than once",
+                        .level = LintLevel::Error,
+                        .total = texels,
+                        .unit = "texels"};
     for (const ChartFigures& chart : charts_) {
       if (!(chart.overlap > 0)) continue;
       overlap.count += chart.overlap;
@@ -340,6 +355,10 @@ class Linter {
 
 }  // namespace
 
+const char* nameOf(LintLevel level) {
+  return level == LintLevel::Error ? "error" : level == LintLevel::Warning ? "warning" : "note";
+}
+
 LintReport lintAtlas(const Scene& scene, const Atlas& atlas, int padding) { return Linter(scene, atlas, padding).run(); }
 
 std::vector<std::string> lintText(const LintReport& report) {
@@ -347,8 +366,7 @@ std::vector<std::string> lintText(const LintReport& report) {
   char text[400];
   for (const LintFinding& f : report.findings) {
     if (!(f.count > 0)) continue;
-    const char* level = f.level == LintLevel::Error ? "error" : f.level == LintLevel::Warning ? "warning" : "note";
-    std::snprintf(text, sizeof text, "%s: %s: %.6g of %.6g %s: %s; worst: ", level, f.id.c_str(), f.count, f.total, f.unit.c_str(), f.meaning.c_str());
+    std::snprintf(text, sizeof text, "%s: %s: %.6g of %.6g %s: %s; worst: ", nameOf(f.level), f.id.c_str(), f.count, f.total, f.unit.c_str(), f.meaning.c_str());
     lines.push_back(text + f.worst + " (page " + std::to_string(f.page) + ", texel " + std::to_string(f.x) + " " + std::to_string(f.y) + ")");
   }
   std::snprintf(text, sizeof text, "%zu charts on %zu pages, %.0f of %.0f texels covered (%.1f %%), %.1f MB of half-float maps", report.charts,

@@ -11,16 +11,17 @@
 namespace lumel {
 
 enum class LintLevel { Note, Warning, Error };
+const char* nameOf(LintLevel level);  // "note", "warning", "error"
 
 /// One kind of finding. `count` of `total` things; the worst one by name and place.
 struct LintFinding {
-  std::string id;       // "overlap", for programs
-  std::string meaning;  // one line for people
+  std::string id{};       // "overlap", for programs
+  std::string meaning{};  // one line for people
   LintLevel level = LintLevel::Note;
   double count = 0.0;
   double total = 0.0;
-  std::string unit;     // of count and total: "texels", "charts", "triangles", "vertices"
-  std::string worst;    // name of the instance and primitive; empty without a finding
+  std::string unit{};     // of count and total: "texels", "charts", "triangles", "vertices"
+  std::string worst{};    // name of the instance and primitive; empty without a finding
   int page = -1;        // where the worst one is
   int x = 0, y = 0;     // texel of that page
   double worstValue = 0.0;

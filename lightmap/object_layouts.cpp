@@ -44,10 +44,6 @@ bool sameShape(const Shape& a, const Shape& b) {
   return true;
 }
 
-}  // namespace
-
-namespace {
-
 /// `v` made a unit vector, through double: transforms of tiny or huge instances leave float's range when squared.
 Vec3 unitOr(const Vec3& v, const Vec3& otherwise) {
   const Vec3d d(v);
@@ -91,7 +87,7 @@ double weightedArea(const Scene& scene, const Instance& instance) {
       const Vec3d a = linear * Vec3d(primitive.positions[primitive.indices[3 * t]]);
       const Vec3d b = linear * Vec3d(primitive.positions[primitive.indices[3 * t + 1]]);
       const Vec3d c = linear * Vec3d(primitive.positions[primitive.indices[3 * t + 2]]);
-      sum += 0.5 * glm::length(glm::cross(b - a, c - a));
+      sum += triangleArea(a, b, c);
     }
   }
   const double scale = instance.settings.texelDensityScale;

@@ -1,8 +1,10 @@
 #include "lightmap/scene_charts.h"
 
 #include <algorithm>
-#include <bit>
+#include <array>
+#include <compare>
 #include <numeric>
+#include <utility>
 
 #include "lightmap/bake_frame.h"
 #include "lightmap/scene_uvs.h"
@@ -11,12 +13,10 @@
 namespace lumel {
 namespace {
 
-constexpr float kFrameCos = 0.9962f;  // 5 degrees: what a consumer would see
-
 struct UvVertex {
-  std::array<std::uint32_t, 5> key;  // position, uv
-  std::uint32_t index;               // over all primitives
-  bool operator<(const UvVertex& other) const { return key != other.key ? key < other.key : index < other.index; }
+  std::pair<std::array<std::uint32_t, 3>, std::array<std::uint32_t, 2>> key;  // position, uv
+  std::uint32_t index;                                                        // over all primitives
+  auto operator<=>(const UvVertex&) const = default;
 };
 
 struct ChartFigures {
@@ -37,11 +37,9 @@ Vertices gather(const Mesh& mesh) {
     all.base.push_back(static_cast<std::uint32_t>(all.vertices.size()));
     const bool hasUvs = primitive.uvSets.size() > 1 && primitive.uvSets[1].size() == primitive.positions.size();
     for (std::size_t i = 0; i < primitive.positions.size(); ++i) {
-      const Vec3 p = primitive.positions[i] + 0.0f;
-      const Vec2 uv = (hasUvs ? primitive.uvSets[1][i] : Vec2(0.0f)) + 0.0f;
-      all.vertices.push_back({{std::bit_cast<std::uint32_t>(p.x), std::bit_cast<std::uint32_t>(p.y), std::bit_cast<std::uint32_t>(p.z),
-                               std::bit_cast<std::uint32_t>(uv.x), std::bit_cast<std::uint32_t>(uv.y)},
-                              static_cast<std::uint32_t>(all.vertices.size())});
+      const Vec2 uv = hasUvs ? primitive.uvSets[1][i] : Vec2(0.0f);
+      all.vertices.push_back(
+          {{bitsOf(primitive.positions[i]), bitsOf(uv)}, static_cast<std::uint32_t>(all.vertices.size())});
       all.frames.push_back(hasMaterialFrame(primitive) ? primitive.tangents[i] : Vec4(0.0f));
     }
   }
@@ -50,7 +48,7 @@ Vertices gather(const Mesh& mesh) {
 
 bool sameFrame(const Vec4& a, const Vec4& b) {
   if ((a.w == 0) != (b.w == 0)) return false;
-  return a.w == 0 || (a.w * b.w > 0 && glm::dot(Vec3(a), Vec3(b)) >= kFrameCos);
+  return a.w == 0 || (a.w * b.w > 0 && glm::dot(Vec3(a), Vec3(b)) >= kSameFrameCos);
 }
 
 }  // namespace
@@ -104,10 +102,8 @@ std::vector<PlacedTriangle> placeSceneUvs(const Scene& scene, int instanceIndex,
       p[k] = Vec3d(instance.worldFromObject * Vec4(primitive.positions[v], 1.0f));
       chart.crossesFrame = chart.crossesFrame || breaks[all.base[static_cast<std::size_t>(triangle.primitive)] + v];
     }
-    chart.surface += 0.5 * glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
-    const Vec2d e1 = Vec2d(triangle.uvs[1]) - Vec2d(triangle.uvs[0]);
-    const Vec2d e2 = Vec2d(triangle.uvs[2]) - Vec2d(triangle.uvs[0]);
-    chart.texels += 0.5 * std::abs(e1.x * e2.y - e1.y * e2.x) * pageSize * pageSize;
+    chart.surface += triangleArea(p[0], p[1], p[2]);
+    chart.texels += triangleArea(Vec2d(triangle.uvs[0]), triangle.uvs[1], triangle.uvs[2]) * pageSize * pageSize;
   }
   for (const ChartFigures& chart : figures) {
     atlas.charts.push_back({-1, chart.surface > 0 ? static_cast<float>(std::sqrt(chart.texels / chart.surface)) : 0.0f});

@@ -46,10 +46,9 @@ Examination examine(const Scene& scene, const Instance& instance, int pageSize) 
         uv[k] = uvs[primitive.indices[3 * t + k]];
         p[k] = Vec3d(instance.worldFromObject * Vec4(primitive.positions[primitive.indices[3 * t + k]], 1.0f));
       }
-      const double area = glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
+      const double area = triangleArea(p[0], p[1], p[2]);
       surface += area;
-      const double uvArea = (uv[1].x - uv[0].x) * (uv[2].y - uv[0].y) - (uv[1].y - uv[0].y) * (uv[2].x - uv[0].x);
-      if (uvArea != 0) {
+      if (signedArea(uv[0], uv[1], uv[2]) != 0) {
         for (Vec2d& q : uv) q *= static_cast<double>(pageSize);
         result.triangles.push_back(uv);
       } else if (area > 0) {

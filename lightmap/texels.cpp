@@ -68,7 +68,7 @@ Bands makeBands(const Atlas& atlas, int pageIndex) {
   return bands;
 }
 
-/// Texels of rows [firstRow, firstRow + kBandRows) of a page, as in PageTexels but counted from 0.
+/// Texels of rows [firstRow, firstRow + kBandRows) of a page; firstTriangle counts from 0 and lacks its last entry.
 PageTexels findInBand(const Atlas& atlas, const Page& page, std::span<const TriangleRef> triangles, int firstRow) {
   const int rows = std::min(kBandRows, page.height - firstRow);
   const TexelWindow window{0, firstRow, page.width, firstRow + rows};

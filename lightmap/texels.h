@@ -1,5 +1,5 @@
 // From surfaces to texels: which texels of a page are covered by which triangles, and how to sample points on the
-// covered part of a texel. Samples never lie off the surface (DESIGN: the footprint is clipped by the chart).
+// covered part of a texel. Samples never lie off the surface: the footprint is clipped by the chart.
 #pragma once
 
 #include <array>

@@ -150,17 +150,10 @@ Unwrapped unwrap(TriangleSoup&& soup, const UnwrapOptions& options) {
   result.degenerateTriangles = mesh.leftOut.size();
   result.nonManifoldEdges = mesh.nonManifoldEdges;
   result.charts.resize(charts.size());
-  std::vector<std::uint8_t> tooLarge(charts.size(), 0);
   constexpr std::size_t kGrain = 64;
   parallelFor(charts.size(), kGrain, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      result.charts[i] = finish(mesh, charts[i], options.largestSide);
-      Vec2 high(0.0f);
-      for (const Vec2 uv : result.charts[i].uvs) high = glm::max(high, uv);
-      tooLarge[i] = static_cast<double>(std::max(high.x, high.y)) > options.largestSide * 1.000001;
-    }
+    for (std::size_t i = first; i < last; ++i) result.charts[i] = finish(mesh, charts[i], options.largestSide);
   });
-  result.tooLarge = std::find(tooLarge.begin(), tooLarge.end(), 1) != tooLarge.end();
   std::stable_sort(result.charts.begin(), result.charts.end(), [](const UnwrappedChart& a, const UnwrappedChart& b) {
     return a.triangles.front() < b.triangles.front();
   });

@@ -25,7 +25,6 @@ struct Unwrapped {
   std::vector<UnwrappedChart> charts;  // ordered by their first triangle
   std::size_t degenerateTriangles = 0;
   std::size_t nonManifoldEdges = 0;
-  bool tooLarge = false;  // a single triangle is longer than largestSide
 };
 
 /// Deterministic; parallel over charts. Takes the soup, to be rid of it before memory is at its peak.

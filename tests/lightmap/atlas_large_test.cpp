@@ -1,9 +1,9 @@
 // One connected smooth surface of many triangles: charts and time stay sane.
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cmath>
 
+#include "scene/stopwatch.h"
 #include "tests/lightmap/chart_checks.h"
 
 namespace lumel {
@@ -11,9 +11,9 @@ namespace {
 
 TEST(LargeTerrain, OfAHundredThousandTrianglesIsAFewSoundCharts) {
   const Scene scene = terrain(224, 100);
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch stopwatch;
   const AtlasResult result = chartsOf(scene, 8, 1024);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = stopwatch.seconds();
   const AtlasFigures f = measureAtlas(result.atlas);
   EXPECT_EQ(f.triangles, 2u * 224 * 224);
   EXPECT_EQ(f.flipped, 0u);
