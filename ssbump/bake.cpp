@@ -1,12 +1,12 @@
 #include "ssbump/bake.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 
 #include "scene/check.h"
 #include "scene/parallel.h"
+#include "scene/stopwatch.h"
 #include "ssbump/bilateral.h"
 
 namespace lumel::ssbump {
@@ -14,9 +14,6 @@ namespace {
 
 // About 200 bytes per texel of triangles and tree: 3.3 GB.
 constexpr std::size_t kMostRayTexels = 4096 * 4096;
-
-using Clock = std::chrono::steady_clock;
-double secondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// The alpha channel of a file, unless it is the one that holds the heights.
 Image alphaPlane(const LoadedImage& loaded, int heightChannel) {
@@ -181,7 +178,7 @@ Expected<BakedInMemory> bakeInMemory(const std::filesystem::path& input, const B
 Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const BakeSettings& settings,
                                    Progress& progress) {
   LUMEL_CHECK(settings.tileHeight % 2 == 0 && settings.tileWidth > 0);
-  const auto started = Clock::now();
+  const Stopwatch sinceStart;
   auto inputs = readInputs(input, settings, progress);
   if (!inputs) return inputs.error();
   const HeightField& field = inputs->field;
@@ -198,15 +195,15 @@ Expected<BakeReport> bakeHeightMap(const std::filesystem::path& input, const Bak
   auto maps = MapSet::open(settings.maps, field.width, field.height, std::move(inputs->alpha),
                            describe(settings, field, report.reachTexels), progress);
   if (!maps) return maps.error();
-  report.prepareSeconds = secondsSince(started);
+  report.prepareSeconds = sinceStart.seconds();
 
   progress.begin("ssbump", field.texels.size());
   for (int y = 0; y < field.height; y += settings.tileHeight) {
     const int rows = std::min(settings.tileHeight, field.height - y);
-    const auto before = Clock::now();
+    const Stopwatch occlusionTime;
     auto occlusion = bandOcclusion(*occluder, settings, field.width, y, rows, maps->lobes(), progress);
     if (!occlusion) return occlusion.error();
-    report.occlusionSeconds += secondsSince(before);
+    report.occlusionSeconds += occlusionTime.seconds();
     if (auto done = maps->write(bandNormals(*inputs, settings.normalMapGreen, y, rows), *occlusion, progress); !done)
       return done.error();
   }

@@ -60,11 +60,9 @@ Expected<void> combine(Image& image, const Encoding& encoding, const MapForm& fo
     blendDetail(image, *detail, encoding, settings.detailRepeats);
   }
   if (!settings.albedo.empty()) {
-    auto albedo = readImage(settings.albedo, progress);
+    auto albedo = readAlbedo(settings.albedo, progress);
     if (!albedo) return albedo.error();
-    if (!albedo->isFloat)
-      for (float& v : albedo->image.pixels) v = srgbToLinear(v);
-    modulateByAlbedo(image, albedo->image);
+    modulateByAlbedo(image, *albedo);
   }
   return {};
 }
@@ -84,6 +82,14 @@ std::optional<MapForm> formFromMetadata(const LoadedImage& image) {
   const auto h = parseHand(hand);
   if (!c || !h) return std::nullopt;
   return MapForm{Encoding{*c, *h}, Green::Up};
+}
+
+Expected<Image> readAlbedo(const std::filesystem::path& file, const Progress& progress) {
+  auto loaded = readImage(file, progress);
+  if (!loaded) return loaded.error();
+  if (!loaded->isFloat)
+    for (float& v : loaded->image.pixels) v = srgbToLinear(v);
+  return std::move(loaded->image);
 }
 
 Expected<Image> readMapAs(const std::filesystem::path& file, const MapForm& form, const Encoding& encoding,

@@ -35,6 +35,9 @@ Expected<void> convertMap(const std::filesystem::path& input, const std::filesys
 Expected<Image> readMapAs(const std::filesystem::path& file, const MapForm& form, const Encoding& encoding,
                           const Progress& progress);
 
+/// A colour map as linear values: sRGB unless the file holds floats. Errors: Input, Interrupted.
+Expected<Image> readAlbedo(const std::filesystem::path& file, const Progress& progress);
+
 /// The form that a file's metadata names, if it names one.
 std::optional<MapForm> formFromMetadata(const LoadedImage& image);
 

@@ -11,7 +11,7 @@
 namespace lumel::ssbump {
 namespace {
 
-// A block of texels goes through all azimuths before the next: what it reads stays in the second cache. Blocks lie at
+// A block of texels goes through all azimuths before the next: what it reads stays in the L2 cache. Blocks lie at
 // multiples of their size in the map, so that cells do.
 constexpr int kBlockWidth = 2 * kHorizonBlock, kBlockHeight = 32;
 
@@ -174,7 +174,7 @@ Image Horizon::occlusion(const TexelRect& rect, std::span<const Lobe> lobes, Pro
   for (int j = 0; j < settings_.azimuths; ++j)
     tile.slices.push_back(
         makeSlice(sliceAzimuth(j, settings_.azimuths), settings_.reach, octaves, lobes, tile.heights.rowStride()));
-  // One axis after the other: each has levels of its own, which the second cache does not hold together.
+  // One axis after the other: each has levels of its own, which the L2 cache does not hold together.
   std::stable_sort(tile.slices.begin(), tile.slices.end(),
                    [](const Slice& a, const Slice& b) { return a.along < b.along; });
   std::vector<float> open(lobes.size(), 0.0f);  // summed as the kernel sums: flat gives exactly 1

@@ -251,21 +251,19 @@ SimdLevel bestSimdLevel() {
   return SimdLevel::Baseline;
 }
 
-void farCells(const FarCells& cells, SimdLevel level) {
+void farCells(const FarCells& cells, [[maybe_unused]] SimdLevel level) {
 #if defined(__x86_64__)
   if (level == SimdLevel::Avx512) return farCellsAvx512(cells);
   if (level == SimdLevel::Avx2) return farCellsAvx2(cells);
 #endif
-  (void)level;
   farCellsBaseline(cells);
 }
 
-void nearRows(std::span<const NearRow> rows, SimdLevel level) {
+void nearRows(std::span<const NearRow> rows, [[maybe_unused]] SimdLevel level) {
 #if defined(__x86_64__)
   if (level == SimdLevel::Avx512) return nearRowsAvx512(rows);
   if (level == SimdLevel::Avx2) return nearRowsAvx2(rows);
 #endif
-  (void)level;
   nearRowsBaseline(rows);
 }
 

@@ -63,7 +63,7 @@ SimdLevel bestSimdLevel();
 
 void farCells(const FarCells& cells, SimdLevel level);
 
-/// All rows block by block, so that the rows' common neighbourhood stays in the first cache. Rows of one width.
+/// All rows block by block, so that the rows' common neighbourhood stays in the L1 cache. Rows of one width.
 void nearRows(std::span<const NearRow> rows, SimdLevel level);
 
 }  // namespace lumel::ssbump

@@ -1,6 +1,7 @@
 #include "ssbump/map_set.h"
 
 #include <algorithm>
+#include <functional>
 
 #include "lightmap/rnm_basis.h"
 #include "scene/check.h"
@@ -9,14 +10,6 @@
 
 namespace lumel::ssbump {
 namespace {
-
-Expected<Image> readAlbedo(const std::filesystem::path& file, const Progress& progress) {
-  auto loaded = readImage(file, progress);
-  if (!loaded) return loaded.error();
-  if (!loaded->isFloat)
-    for (float& v : loaded->image.pixels) v = srgbToLinear(v);
-  return std::move(loaded->image);
-}
 
 Expected<Image> readMask(const std::filesystem::path& file, int width, int height, const Progress& progress) {
   auto loaded = readImage(file, progress);
@@ -48,72 +41,95 @@ std::vector<std::string> channelNames(std::size_t count, bool alpha) {
   return names;
 }
 
+Expected<void> checkBasis(const MapSettings& settings) {
+  if (settings.basis.empty()) return {};
+  if (settings.encoding.hand == Hand::Left)
+    return usageError("--hand left is a swap of the RNM basis's channels; it does not go with --basis");
+  if (settings.basis.size() != 3 && (!settings.detail.empty() || !settings.files.recovered.empty()))
+    return usageError("--detail and --save-recovered need the three RNM vectors; leave out --basis");
+  return {};
+}
+
+std::string textOf(std::span<const Vec3> basis) {
+  std::string text;
+  for (const Vec3& v : basis)
+    text += std::to_string(v.x) + " " + std::to_string(v.y) + " " + std::to_string(v.z) + "; ";
+  return text;
+}
+
 }  // namespace
 
 Expected<MapSet> MapSet::open(const MapSettings& settings, int width, int height, Image alpha,
                               std::map<std::string, std::string> metadata, const Progress& progress) {
+  if (auto good = checkBasis(settings); !good) return good.error();
   MapSet set;
   set.settings_ = settings;
   set.width_ = width;
   set.height_ = height;
   set.alpha_ = std::move(alpha);
+  if (auto done = set.readImages(progress); !done) return done.error();
+
   const bool rnm = settings.basis.empty();
-  set.basisSize_ = rnm ? 3 : settings.basis.size();
-  if (!rnm && settings.encoding.hand == Hand::Left)
-    return usageError("--hand left is a swap of the RNM basis's channels; it does not go with --basis");
-  if (!rnm && set.basisSize_ != 3 && (!settings.detail.empty() || !settings.files.recovered.empty()))
-    return usageError("--detail and --save-recovered need the three RNM vectors; leave out --basis");
-  if (!settings.mask.empty()) {
-    auto mask = readMask(settings.mask, width, height, progress);
-    if (!mask) return mask.error();
-    set.alpha_ = std::move(*mask);
-  }
-  if (!settings.albedo.empty()) {
-    auto albedo = readAlbedo(settings.albedo, progress);
-    if (!albedo) return albedo.error();
-    set.albedo_ = std::move(*albedo);
-  }
-  if (!settings.detail.empty()) {
-    auto detail = readMapAs(settings.detail, {settings.encoding, Green::Up}, settings.encoding, progress);
-    if (!detail) return detail.error();
-    set.detail_ = std::move(*detail);
-  }
   const std::span<const Vec3> basis = rnm ? std::span<const Vec3>(kRnmBasis) : std::span<const Vec3>(settings.basis);
+  set.basisSize_ = basis.size();
   for (const Vec3& axis : basis) set.lobes_.push_back({axis, settings.lobe, settings.coneOpeningDegrees});
   if (!settings.files.ambient.empty()) set.lobes_.push_back(ambientLobe());
 
   for (const auto& [key, value] : encodingMetadata(settings.encoding)) metadata[key] = value;
-  if (!rnm) {
-    std::string text;
-    for (const Vec3& v : basis)
-      text += std::to_string(v.x) + " " + std::to_string(v.y) + " " + std::to_string(v.z) + "; ";
-    metadata["lumel:ssbump:basis"] = text;
-  }
+  if (!rnm) metadata["lumel:ssbump:basis"] = textOf(basis);
   metadata["lumel:green"] = settings.green == Green::Up ? "up" : "down";
-  const auto open = [&](const std::filesystem::path& file, std::size_t channels, bool withAlpha, MapKind kind,
-                        const char* content, std::optional<MapWriter>& writer) -> Expected<void> {
-    if (file.empty()) return {};
-    auto names = channels == 1 ? std::vector<std::string>{"Y"} : channelNames(channels, withAlpha);
-    auto own = metadata;
-    own["lumel:content"] = content;
-    auto opened = MapWriter::open(set.files_, file, width, height, static_cast<int>(channels) + (withAlpha ? 1 : 0), kind,
-                                  settings.options, std::move(names), std::move(own));
-    if (!opened) return opened.error();
-    writer.emplace(std::move(*opened));
-    return {};
-  };
-  const bool hasAlpha = !set.alpha_.empty();
-  const MapFiles& f = settings.files;
-  for (const auto& opened :
-       {open(f.ssbump, set.basisSize_, hasAlpha, MapKind::Weights, "ssbump", set.ssbump_),
-        open(f.weights, set.basisSize_, false, MapKind::Weights, "weights without occlusion", set.weights_),
-        open(f.occlusion, set.basisSize_, false, MapKind::Weights, "visibility around each basis vector",
-             set.occlusion_),
-        open(f.ambient, 1, false, MapKind::Weights, "cosine-weighted visibility", set.ambient_),
-        open(f.normal, 3, false, MapKind::Normals, "normal map", set.normal_),
-        open(f.recovered, 3, false, MapKind::Normals, "normal map recovered from the ssbump map", set.recovered_)})
-    if (!opened) return opened.error();
+  if (auto done = set.openFiles(metadata); !done) return done.error();
   return set;
+}
+
+Expected<void> MapSet::readImages(const Progress& progress) {
+  if (!settings_.mask.empty()) {
+    auto mask = readMask(settings_.mask, width_, height_, progress);
+    if (!mask) return mask.error();
+    alpha_ = std::move(*mask);
+  }
+  if (!settings_.albedo.empty()) {
+    auto albedo = readAlbedo(settings_.albedo, progress);
+    if (!albedo) return albedo.error();
+    albedo_ = std::move(*albedo);
+  }
+  if (!settings_.detail.empty()) {
+    auto detail = readMapAs(settings_.detail, {settings_.encoding, Green::Up}, settings_.encoding, progress);
+    if (!detail) return detail.error();
+    detail_ = std::move(*detail);
+  }
+  return {};
+}
+
+Expected<void> MapSet::openFiles(const std::map<std::string, std::string>& metadata) {
+  const MapFiles& f = settings_.files;
+  const bool hasAlpha = !alpha_.empty();
+  struct Output {
+    const std::filesystem::path& file;
+    std::optional<MapWriter>& writer;
+    std::vector<std::string> channels;
+    MapKind kind;
+    const char* content;
+  };
+  const std::vector<std::string> rgb = channelNames(3, false), grey{"Y"};
+  const std::vector<std::string> basisChannels = basisSize_ == 1 ? grey : channelNames(basisSize_, false);
+  const Output outputs[] = {
+      {f.ssbump, ssbump_, hasAlpha ? channelNames(basisSize_, true) : basisChannels, MapKind::Weights, "ssbump"},
+      {f.weights, weights_, basisChannels, MapKind::Weights, "weights without occlusion"},
+      {f.occlusion, occlusion_, basisChannels, MapKind::Weights, "visibility around each basis vector"},
+      {f.ambient, ambient_, grey, MapKind::Weights, "cosine-weighted visibility"},
+      {f.normal, normal_, rgb, MapKind::Normals, "normal map"},
+      {f.recovered, recovered_, rgb, MapKind::Normals, "normal map recovered from the ssbump map"}};
+  for (const Output& output : outputs) {
+    if (output.file.empty()) continue;
+    auto own = metadata;
+    own["lumel:content"] = output.content;
+    auto opened = MapWriter::open(files_, output.file, width_, height_, static_cast<int>(output.channels.size()),
+                                  output.kind, settings_.options, output.channels, std::move(own));
+    if (!opened) return opened.error();
+    output.writer.emplace(std::move(*opened));
+  }
+  return {};
 }
 
 Image MapSet::compose(const Image& normals, const Image& occlusion, bool withOcclusion) const {
@@ -160,11 +176,8 @@ Expected<void> MapSet::write(const Image& normals, const Image& occlusion, const
   LUMEL_CHECK(static_cast<std::size_t>(occlusion.channels) == lobes_.size());
   Image ssbump = compose(normals, occlusion, true);
   modulate(ssbump);
-  const auto put = [&](std::optional<MapWriter>& writer, const auto& make) {
-    return writer ? writer->write(make(), progress) : Expected<void>();
-  };
-  const auto perTexel = [&](int channels, const auto& value) {
-    Image out(normals.width, normals.height, channels);
+  const auto perTexel = [&](std::size_t channels, const std::function<void(int x, int y, float* out)>& value) {
+    Image out(normals.width, normals.height, static_cast<int>(channels));
     forEachTexel(out, [&](int x, int y) { value(x, y, out.at(x, y)); });
     return out;
   };
@@ -172,34 +185,29 @@ Expected<void> MapSet::write(const Image& normals, const Image& occlusion, const
     const Vec3 stored = encodeNormal(n, settings_.green);
     std::copy_n(&stored.x, 3, out);
   };
-  if (auto r = put(weights_, [&] { return compose(normals, occlusion, false); }); !r) return r;
-  if (auto r = put(occlusion_,
-                   [&] {
-                     return perTexel(static_cast<int>(basisSize_), [&](int x, int y, float* out) {
-                       std::copy_n(occlusion.at(x, y), basisSize_, out);
-                     });
-                   });
-      !r)
-    return r;
-  if (auto r =
-          put(ambient_,
-              [&] { return perTexel(1, [&](int x, int y, float* out) { *out = occlusion.at(x, y)[basisSize_]; }); });
-      !r)
-    return r;
-  if (auto r = put(normal_,
-                   [&] { return perTexel(3, [&](int x, int y, float* out) { setNormal(normals.rgb(x, y), out); }); });
-      !r)
-    return r;
-  if (auto r = put(recovered_,
-                   [&] {
-                     return perTexel(3, [&](int x, int y, float* out) {
-                       const Vec3 s =
-                           convert(ssbump.rgb(x, y), settings_.encoding, {settings_.encoding.convention, Hand::Right});
-                       setNormal(recoveredNormal(s, settings_.encoding.convention), out);
-                     });
-                   });
-      !r)
-    return r;
+  const auto recovered = [&](int x, int y, float* out) {
+    const Encoding& own = settings_.encoding;
+    setNormal(recoveredNormal(convert(ssbump.rgb(x, y), own, {own.convention, Hand::Right}), own.convention), out);
+  };
+  struct Output {
+    std::optional<MapWriter>& writer;
+    std::function<Image()> make;
+  };
+  const Output outputs[] = {
+      {weights_, [&] { return compose(normals, occlusion, false); }},
+      {occlusion_,
+       [&] {
+         return perTexel(basisSize_,
+                         [&](int x, int y, float* out) { std::copy_n(occlusion.at(x, y), basisSize_, out); });
+       }},
+      {ambient_,
+       [&] { return perTexel(1, [&](int x, int y, float* out) { *out = occlusion.at(x, y)[basisSize_]; }); }},
+      {normal_,
+       [&] { return perTexel(3, [&](int x, int y, float* out) { setNormal(normals.rgb(x, y), out); }); }},
+      {recovered_, [&] { return perTexel(3, recovered); }}};
+  for (const Output& output : outputs)
+    if (output.writer)
+      if (auto done = output.writer->write(output.make(), progress); !done) return done;
   addAlpha(ssbump);
   row_ += normals.height;
   return ssbump_ ? ssbump_->write(ssbump, progress) : Expected<void>();

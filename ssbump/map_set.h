@@ -56,6 +56,8 @@ class MapSet {
   std::vector<std::string> warnings() const;
 
  private:
+  Expected<void> readImages(const Progress& progress);
+  Expected<void> openFiles(const std::map<std::string, std::string>& metadata);
   Image compose(const Image& normals, const Image& occlusion, bool withOcclusion) const;
   void modulate(Image& rows) const;
   void addAlpha(Image& rows) const;

@@ -7,11 +7,6 @@
 namespace lumel::ssbump {
 namespace {
 
-int wrapIndex(int i, int size) {
-  i %= size;
-  return i < 0 ? i + size : i;
-}
-
 /// out[i] = max(out[i], row[x0 + i]) with the row repeated, or left alone where a row that does not wrap has ended.
 void maxRow(const float* row, int width, bool wrap, int x0, std::span<float> out) {
   const int count = static_cast<int>(out.size());

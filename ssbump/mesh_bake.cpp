@@ -1,16 +1,12 @@
-#include <chrono>
-
 #include "scene/load_scene.h"
+#include "scene/stopwatch.h"
 #include "ssbump/mesh_source.h"
 
 namespace lumel::ssbump {
 
 Expected<BakeReport> bakeMesh(const std::filesystem::path& high, const std::filesystem::path& low,
                               const MeshSettings& settings, Progress& progress) {
-  const auto started = std::chrono::steady_clock::now();
-  const auto seconds = [&] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-  };
+  const Stopwatch sinceStart;
   auto highScene = loadScene(high);
   if (!highScene) return highScene.error();
   std::optional<Scene> lowScene;
@@ -28,14 +24,14 @@ Expected<BakeReport> bakeMesh(const std::filesystem::path& high, const std::file
   BakeReport report;
   report.width = settings.width;
   report.height = settings.height;
-  report.prepareSeconds = seconds();
+  report.prepareSeconds = sinceStart.seconds();
   auto texels = gatherMesh(*highScene, lowScene ? &*lowScene : nullptr, settings, maps->lobes(), progress);
   if (!texels) {
     const Error& e = texels.error();
     if (e.kind == ErrorKind::Interrupted) return e;
     return Error{e.kind, (e.message.starts_with("low-poly") ? low : high).string() + ": " + e.message};
   }
-  report.occlusionSeconds = seconds() - report.prepareSeconds;
+  report.occlusionSeconds = sinceStart.seconds() - report.prepareSeconds;
   if (auto done = maps->write(texels->normals, texels->occlusion, progress); !done) return done.error();
   if (auto done = maps->commit(progress); !done) return done.error();
   report.warnings = maps->warnings();

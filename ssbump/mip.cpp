@@ -51,9 +51,7 @@ std::vector<Taps> makeTaps(int in, int out, MipFilter filter) {
 }
 
 int edge(int i, int size, bool wrap) {
-  if (!wrap) return std::clamp(i, 0, size - 1);
-  i %= size;
-  return i < 0 ? i + size : i;
+  return wrap ? wrapIndex(i, size) : std::clamp(i, 0, size - 1);
 }
 
 }  // namespace
@@ -98,12 +96,6 @@ std::vector<Image> mipLevels(const Image& image, MipFilter filter, bool wrap, co
     last = &levels.back();
   }
   return levels;
-}
-
-int fullMipCount(int width, int height) {
-  int count = 1;
-  for (int side = std::max(width, height); side > 1; side /= 2) ++count;
-  return count;
 }
 
 }  // namespace lumel::ssbump

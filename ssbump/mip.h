@@ -20,7 +20,4 @@ Image halve(const Image& image, MipFilter filter, bool wrap, const Progress& pro
 /// All levels below `image` down to 1x1, largest first; fewer once `progress` is cancelled.
 std::vector<Image> mipLevels(const Image& image, MipFilter filter, bool wrap, const Progress& progress = noProgress());
 
-/// Number of levels of a full chain, the image itself included.
-int fullMipCount(int width, int height);
-
 }  // namespace lumel::ssbump

@@ -46,13 +46,6 @@ std::uint32_t sobolSecond(std::uint32_t index) {
 
 }  // namespace
 
-Expected<RaySampling> parseRaySampling(const std::string& text) {
-  if (text == "random") return RaySampling::Random;
-  if (text == "stratified") return RaySampling::Stratified;
-  if (text == "sobol") return RaySampling::Sobol;
-  return usageError("unknown ray sampling '" + text + "'; use stratified, sobol or random");
-}
-
 HemisphereSamples::HemisphereSamples(RaySampling sampling, int count, std::uint32_t seed)
     : sampling_(sampling), count_(count), columns_(1), seed_(seed) {
   // The most nearly square grid that divides the count (300 = 15 x 20); a prime count degrades to one row.

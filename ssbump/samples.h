@@ -3,9 +3,7 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 
-#include "scene/expected.h"
 #include "scene/math.h"
 
 namespace lumel::ssbump {
@@ -15,8 +13,6 @@ enum class RaySampling {
   Stratified,  // one jittered direction in each cell of a grid over the hemisphere; same cell for the same index
   Sobol,  // Owen-scrambled (0,2)-sequence, scrambled per texel (Burley 2020, "Practical Hash-based Owen Scrambling")
 };
-
-Expected<RaySampling> parseRaySampling(const std::string& text);
 
 class HemisphereSamples {
  public:
