@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <chrono>
 #include <limits>
 #include <optional>
 #include <span>
@@ -14,6 +13,7 @@
 #include "baker/gather_integrator.h"
 #include "baker/path_integrator.h"
 #include "scene/parallel.h"
+#include "scene/stopwatch.h"
 
 namespace lumel {
 namespace {
@@ -294,7 +294,7 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
 
 Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
                           const BakeOptions& options, Progress& progress) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch sinceStart;
   std::vector<std::string> notes;
   const Materials materials(scene, options.bounces != 0, notes);
   auto rays = RayScene::build(scene, materials);
@@ -314,7 +314,7 @@ Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vec
   result.stats = sumUp(*waveStats, options.seed);
   for (const PageTexels& page : texels) result.stats.texels += page.size();
   result.stats.notes.insert(result.stats.notes.begin(), notes.begin(), notes.end());
-  result.stats.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.stats.seconds = sinceStart.seconds();
   return result;
 }
 

@@ -48,8 +48,8 @@ struct BakeOptions {
 struct BakedPage {
   std::array<Image, 3> rnm;  // RGB
   Image flat;                // RGB: irradiance / pi
-  // Channels of aux, in order: coverage (area share 0..1), validity (share of gather rays that met no back face of a
-  // single-sided, closed surface: 1 = valid), stderr (standard error of the flat map's luminance), samples (those
+  // Channels of aux, in order: coverage (area share 0..1), validity (share of gather rays that met no back of a
+  // single-sided surface), stderr (standard error of the flat map's luminance), samples (those
   // taken of this texel: fewer where it is inside of something).
   Image aux;
 };

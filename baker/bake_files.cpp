@@ -27,16 +27,15 @@ std::map<std::string, std::string> pageMetadata(std::size_t page, const std::str
   metadata["lumel:version"] = kVersion;
   metadata["lumel:page"] = std::to_string(page);
   metadata["lumel:map"] = kind;
-  metadata["lumel:integrator"] = record.bakeOptions.integrator == Integrator::Gather ? "gather" : "path";
+  metadata["lumel:integrator"] = nameOf(record.bakeOptions.integrator);
   metadata["lumel:samples"] = std::to_string(record.bakeOptions.samples);
-  metadata["lumel:bounces"] = record.bakeOptions.bounces < 0 ? "all" : describeBounces(record.bakeOptions.bounces);
+  metadata["lumel:bounces"] = describeBounces(record.bakeOptions.bounces);
   metadata["lumel:seed"] = std::to_string(record.bakeOptions.seed);
   metadata["lumel:dilate"] = std::to_string(record.dilate);
   if (kind == "aux") {
     metadata["lumel:units"] =
         "coverage: area share 0..1; validity: share of gather rays that met no back face; stderr: standard error of "
-        "the "
-        "flat map's luminance; samples: gather rays";
+        "the flat map's luminance; samples: gather rays";
     for (const char* key : {"decode", "decodeFormula", "basis", "order"}) metadata.erase(std::string("lumel:") + key);
   }
   return metadata;

@@ -15,7 +15,7 @@
 namespace lumel {
 
 struct StageTime {
-  std::string stage;  // "load", "charts", "pack", "texels", "bake", "finish", "write"
+  std::string stage;  // "load", "atlas", "texels", "bake", "finish", "write"
   double seconds = 0.0;
 };
 

@@ -16,6 +16,8 @@ const char* nameOf(Projection projection) {
   return "?";
 }
 
+const char* nameOf(Integrator integrator) { return integrator == Integrator::Gather ? "gather" : "path"; }
+
 const char* nameOf(RnmDecode decode) {
   switch (decode) {
     case RnmDecode::Squared:

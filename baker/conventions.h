@@ -10,6 +10,7 @@
 namespace lumel {
 
 const char* nameOf(Projection projection);  // "raw", "flat", "fit"
+const char* nameOf(Integrator integrator);  // "gather", "path"
 const char* nameOf(RnmDecode decode);       // "squared", "linear", "linear-normalized"
 
 std::string describeBounces(int bounces);      // a number, or "all"

@@ -53,10 +53,7 @@ struct Geometry {
 PlacedPrimitive place(const Primitive& primitive, const Mat4& worldFromObject) {
   const Mat3 linear(worldFromObject);
   const bool mirrors = glm::determinant(linear) < 0.0f;
-  // The cofactor matrix: the inverse transpose up to scale, and defined for flattening transforms too.
-  Mat3 normalMatrix(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
-                    glm::cross(linear[0], linear[1]));
-  if (mirrors) normalMatrix = -normalMatrix;
+  const Mat3 normalMatrix = cofactorMatrix(linear) * (mirrors ? -1.0f : 1.0f);
   const auto unit = [](const Vec3& v, const Vec3& otherwise) {
     const float length = glm::length(v);
     return length > 0.0f && std::isfinite(length) ? v / length : otherwise;
@@ -174,9 +171,7 @@ class GlbWriter {
 
   void addLights() {
     for (const Light& light : scene_.lights) {
-      Json json = {{"type", light.type == LightType::Point  ? "point"
-                            : light.type == LightType::Spot ? "spot"
-                                                            : "directional"},
+      Json json = {{"type", nameOf(light.type)},
                    {"color", {light.color.x, light.color.y, light.color.z}},
                    {"intensity", light.intensity}};
       if (!light.name.empty()) json["name"] = light.name;

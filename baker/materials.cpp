@@ -64,10 +64,8 @@ Materials::Materials(const Scene& scene, bool bounces, std::vector<std::string>&
         failures[i] = texture.error().message;
     }
   });
-  for (std::size_t i = 0; i < failures.size(); ++i) {
-    if (!failures[i].empty()) notes.push_back(failures[i] + "; its factor is used alone");
-    if (srgbByImage_[i]) ++decodedTextures_;
-  }
+  for (const std::string& failure : failures)
+    if (!failure.empty()) notes.push_back(failure + "; its factor is used alone");
 }
 
 const Texture* Materials::colorTexture(int index) const {

@@ -44,15 +44,12 @@ class Materials {
   /// Whether no ray can ever hit the primitive.
   bool invisible(const Primitive& primitive) const;
 
-  std::size_t decodedTextures() const { return decodedTextures_; }
-
  private:
   const Texture* colorTexture(int material) const;
   float alpha(const TrianglePoint& point) const;
 
   const Scene* scene_;
   std::vector<std::optional<Texture>> srgbByImage_;  // per Scene::images
-  std::size_t decodedTextures_ = 0;
 };
 
 /// Interpolated texture coordinates; (0, 0) where the primitive lacks the set.

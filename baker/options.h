@@ -56,9 +56,9 @@ class OptionTable {
   Option& integerOrWord(const std::string& name, int& target, Range<int> range, const std::string& word, int wordValue,
                         const std::string& help);
   Option& number(const std::string& name, float& target, Range<float> range, const std::string& help);
-  /// Empty unless given.
   /// A number that may also be given as percent: 1% is 0.01.
   Option& share(const std::string& name, float& target, Range<float> range, const std::string& help);
+  /// Empty unless given.
   Option& optionalNumber(const std::string& name, std::optional<float>& target, Range<float> range,
                          const std::string& help);
   Option& color(const std::string& name, Vec3& target, Range<float> range, const std::string& help);

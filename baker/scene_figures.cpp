@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "baker/memory_estimate.h"
+#include "lightmap/object_layouts.h"
 
 namespace lumel {
 namespace {
@@ -15,7 +16,7 @@ Json toJson(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 
 struct Totals {
   std::size_t instancedTriangles = 0;
-  double receivingArea = 0.0;  // square metres that get a lightmap
+  double receivingArea = 0.0;  // square metres that get a lightmap, weighted by density
   Vec3 least{std::numeric_limits<float>::max()};
   Vec3 most{std::numeric_limits<float>::lowest()};
 };
@@ -23,20 +24,13 @@ struct Totals {
 Totals addUp(const Scene& scene) {
   Totals totals;
   for (const Instance& instance : scene.instances) {
-    const double scale = static_cast<double>(instance.settings.texelDensityScale);
+    totals.receivingArea += weightedArea(scene, instance);
     for (const Primitive& primitive : scene.meshes[toSize(instance.mesh)].primitives) {
       totals.instancedTriangles += primitive.triangleCount();
-      std::vector<Vec3> world;
       for (const Vec3& p : primitive.positions) {
-        world.push_back(Vec3(instance.worldFromObject * Vec4(p, 1.0f)));
-        totals.least = glm::min(totals.least, world.back());
-        totals.most = glm::max(totals.most, world.back());
-      }
-      if (!instance.settings.receives || scene.materials[toSize(primitive.material)].unlit) continue;
-      for (std::size_t i = 0; i + 2 < primitive.indices.size(); i += 3) {
-        const Vec3 edge1 = world[primitive.indices[i + 1]] - world[primitive.indices[i]];
-        const Vec3 edge2 = world[primitive.indices[i + 2]] - world[primitive.indices[i]];
-        totals.receivingArea += 0.5 * glm::length(glm::cross(Vec3d(edge1), Vec3d(edge2))) * scale * scale;
+        const Vec3 world(instance.worldFromObject * Vec4(p, 1.0f));
+        totals.least = glm::min(totals.least, world);
+        totals.most = glm::max(totals.most, world);
       }
     }
   }
@@ -63,9 +57,7 @@ Json describeLights(const Scene& scene) {
   Json list = Json::array();
   for (const Light& light : scene.lights)
     list.push_back({{"name", light.name},
-                    {"type", light.type == LightType::Point  ? "point"
-                             : light.type == LightType::Spot ? "spot"
-                                                             : "directional"},
+                    {"type", nameOf(light.type)},
                     {light.type == LightType::Directional ? "lux" : "candela", light.intensity},
                     {"color", toJson(light.color)},
                     {"position", toJson(light.position)},

@@ -12,18 +12,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const char* levelName(LintLevel level) {
-  switch (level) {
-    case LintLevel::Note: return "note";
-    case LintLevel::Warning: return "warning";
-    case LintLevel::Error: return "error";
-  }
-  return "";
-}
-
 Json findingJson(const LintFinding& f) {
   return {{"id", f.id},
-          {"level", levelName(f.level)},
+          {"level", nameOf(f.level)},
           {"count", f.count},
           {"total", f.total},
           {"unit", f.unit},

@@ -1,12 +1,12 @@
 // Wall time per stage.
 #pragma once
 
-#include <chrono>
 #include <cstdio>
 #include <string>
 #include <vector>
 
 #include "baker/bake_files.h"
+#include "scene/stopwatch.h"
 
 namespace lumel {
 
@@ -19,21 +19,20 @@ class StageClock {
   void start(const std::string& stage) {
     stop();
     stages_.push_back({stage, 0.0});
-    started_ = Clock::now();
+    stopwatch_ = {};
     running_ = true;
   }
   void stop() {
     if (!running_) return;
     running_ = false;
-    stages_.back().seconds = std::chrono::duration<double>(Clock::now() - started_).count();
+    stages_.back().seconds = stopwatch_.seconds();
     if (!quiet_) std::fprintf(stderr, "%-8s %7.2f s\n", stages_.back().stage.c_str(), stages_.back().seconds);
   }
   const std::vector<StageTime>& stages() const { return stages_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
   std::vector<StageTime> stages_;
-  Clock::time_point started_;
+  Stopwatch stopwatch_;  // of the stage that runs
   bool running_ = false;
   bool quiet_ = false;
 };

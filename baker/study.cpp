@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -13,12 +12,12 @@
 #include "baker/finish.h"
 #include "baker/quality.h"
 #include "baker/study_density.h"
+#include "baker/study_maps.h"
 #include "lightmap/texels.h"
+#include "scene/stopwatch.h"
 
 namespace lumel {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 /// Candidates have options.seed; these are far from any that people choose.
 constexpr std::uint64_t kReferenceSeed = 0x9e3779b97f4a7c15ull;
@@ -75,67 +74,6 @@ class ShareOfProgress : public Progress {
   std::atomic<std::uint64_t> done_{0};
 };
 
-/// Over all texels that count, kept in order of pages and rows.
-struct Maps {
-  std::vector<Vec3> flat;
-  std::array<std::vector<Vec3>, 3> rnm;
-  std::vector<float> standardError;
-};
-
-using Mask = std::vector<std::vector<std::uint8_t>>;
-
-/// Texels that path tracing and the gather mean the same by: where part of one is inside of something path tracing
-/// counts that part.
-Mask validTexels(const std::vector<BakedPage>& pages) {
-  constexpr float kLeastValidity = 0.99f;
-  Mask mask;
-  for (const BakedPage& page : pages) {
-    std::vector<std::uint8_t>& m = mask.emplace_back();
-    for (std::size_t i = 0; i < page.aux.pixels.size(); i += 4)
-      m.push_back(page.aux.pixels[i] > 0.0f && page.aux.pixels[i + 1] >= kLeastValidity);
-  }
-  return mask;
-}
-
-Maps mapsOf(const std::vector<BakedPage>& pages, const Mask& mask) {
-  Maps maps;
-  for (std::size_t p = 0; p < pages.size(); ++p)
-    for (std::size_t i = 0; i < mask[p].size(); ++i) {
-      if (!mask[p][i]) continue;
-      const auto pixel = [i](const Image& image) {
-        return Vec3(image.pixels[3 * i], image.pixels[3 * i + 1], image.pixels[3 * i + 2]);
-      };
-      maps.flat.push_back(pixel(pages[p].flat));
-      for (std::size_t k = 0; k < 3; ++k) maps.rnm[k].push_back(pixel(pages[p].rnm[k]));
-      maps.standardError.push_back(pages[p].aux.pixels[4 * i + 2]);
-    }
-  return maps;
-}
-
-double meanOf(const std::vector<Vec3>& map) {
-  double sum = 0.0;
-  for (const Vec3& v : map) sum += static_cast<double>(v.x) + static_cast<double>(v.y) + static_cast<double>(v.z);
-  return map.empty() ? 0.0 : sum / (3.0 * static_cast<double>(map.size()));
-}
-
-/// Mean square and mean of a - b over all values.
-struct Difference {
-  double square = 0.0;
-  double mean = 0.0;
-};
-
-Difference differenceOf(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  Difference d;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    for (int c = 0; c < 3; ++c) {
-      const double e = static_cast<double>(a[i][c]) - static_cast<double>(b[i][c]);
-      d.square += e * e;
-      d.mean += e;
-    }
-  const double count = 3.0 * static_cast<double>(std::max<std::size_t>(1, a.size()));
-  return {d.square / count, d.mean / count};
-}
-
 class Studying {
  public:
   Studying(const Scene& scene, const StudyOptions& options, Progress& progress)
@@ -161,6 +99,7 @@ class Studying {
 
   Expected<Baked> bakeOnce(const Atlas& atlas, const std::vector<PageTexels>& texels, const BakeOptions& options,
                            double expected);
+  Expected<void> makeAtlas();
   Expected<void> pilot();
   Expected<int> planReference() const;
   Expected<void> makeReference();
@@ -169,11 +108,11 @@ class Studying {
   Expected<void> measureDensity(Candidate& candidate);
   void measureDenoised(std::vector<BakedPage>& pages, StudyPoint point);
   void compare(const std::vector<BakedPage>& pages, StudyPoint& point) const;
+  void sortPoints();
   double secondsFor(Integrator integrator, int samples) const {
     const Cost& cost = costs_[static_cast<std::size_t>(integrator)];
     return cost.fixed + cost.perSample * samples;
   }
-  double secondsUsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
   BakeOptions optionsFor(const StudyPoint& point) const {
     return {.integrator = point.integrator,
             .samples = point.samples,
@@ -185,12 +124,12 @@ class Studying {
   const Scene& scene_;
   StudyOptions options_;
   Progress& progress_;
-  const Clock::time_point start_ = Clock::now();
+  const Stopwatch sinceStart_;
   Atlas atlas_;
   bool ownUvs_ = false;  // of the scene
   std::vector<PageTexels> texels_;
-  Mask mask_;
-  Maps truth_;
+  StudyMask mask_;
+  StudyMaps truth_;
   double flatNoise_ = 0.0;  // mean square of the reference's own error
   double rnmNoise_ = 0.0;
   std::array<Cost, 2> costs_{};  // by integrator
@@ -240,7 +179,7 @@ Expected<int> Studying::planReference() const {
 
 Expected<void> Studying::makeReference() {
   StudyReference& reference = study_.reference;
-  std::array<Maps, 2> halves;
+  std::array<StudyMaps, 2> halves;
   for (std::size_t half = 0; half < 2; ++half) {
     BakeOptions options =
         optionsFor({.integrator = Integrator::Path, .projection = options_.projection, .samples = reference.samples});
@@ -300,17 +239,17 @@ std::vector<Studying::Candidate> Studying::candidates() const {
 }
 
 void Studying::compare(const std::vector<BakedPage>& pages, StudyPoint& point) const {
-  const Maps maps = mapsOf(pages, mask_);
+  const StudyMaps maps = mapsOf(pages, mask_);
   const double mean = study_.reference.meanFlat;
   const auto errorOf = [](double square, double noise, double bias, double level) {
     return MapError{std::sqrt(std::max(0.0, square - noise)) / level, bias / level};
   };
-  const Difference flat = differenceOf(maps.flat, truth_.flat);
+  const MapDifference flat = differenceOf(maps.flat, truth_.flat);
   point.flat = errorOf(flat.square, flatNoise_, flat.mean, mean);
-  Difference rnm;
+  MapDifference rnm;
   double rnmMean = 0.0;
   for (std::size_t k = 0; k < 3; ++k) {
-    const Difference d = differenceOf(maps.rnm[k], truth_.rnm[k]);
+    const MapDifference d = differenceOf(maps.rnm[k], truth_.rnm[k]);
     rnm.square += d.square / 3.0;
     rnm.mean += d.mean / 3.0;
     rnmMean += meanOf(truth_.rnm[k]) / 3.0;
@@ -354,10 +293,10 @@ Expected<void> Studying::measure(Candidate& candidate) {
 
 /// The same bake, denoised as for the files.
 void Studying::measureDenoised(std::vector<BakedPage>& pages, StudyPoint point) {
-  const auto began = Clock::now();
+  const Stopwatch stopwatch;
   const double cpu = cpuSecondsNow();
   finishPages(pages, atlas_, texels_, {.denoise = true});
-  point.seconds += std::chrono::duration<double>(Clock::now() - began).count();
+  point.seconds += stopwatch.seconds();
   point.cpuSeconds += cpuSecondsNow() - cpu;
   point.series = "denoised";
   compare(pages, point);
@@ -418,28 +357,41 @@ Expected<void> Studying::measureDensity(Candidate& candidate) {
   return {};
 }
 
-Expected<Study> Studying::run() {
-  {
-    const int asked = options_.atlas.pageSize;
-    ShareOfProgress quiet(progress_, 0.0);
-    auto atlas = buildAtlas(scene_, options_.atlas, quiet);
-    while (!atlas && atlas.error().kind == ErrorKind::Usage && options_.atlas.texelsPerMeter == 0.0f &&
-           options_.atlas.pageSize < kMostPage) {
-      options_.atlas.pageSize *= 2;
-      atlas = buildAtlas(scene_, options_.atlas, quiet);
-    }
-    if (!atlas) return atlas.error();
-    if (options_.atlas.pageSize != asked)
-      study_.notes.push_back("the charts do not fit a page of " + std::to_string(asked) + "; one of " +
-                             std::to_string(options_.atlas.pageSize) + " is used");
-    ownUvs_ = std::any_of(atlas->report.sceneUvs.begin(), atlas->report.sceneUvs.end(),
-                          [](const UvReport& uv) { return uv.valid; }) &&
-              options_.atlas.uvSource != UvSource::Generate;
-    atlas_ = std::move(atlas->atlas);
+Expected<void> Studying::makeAtlas() {
+  const int asked = options_.atlas.pageSize;
+  ShareOfProgress quiet(progress_, 0.0);
+  auto atlas = buildAtlas(scene_, options_.atlas, quiet);
+  while (!atlas && atlas.error().kind == ErrorKind::Usage && options_.atlas.texelsPerMeter == 0.0f &&
+         options_.atlas.pageSize < kMostPage) {
+    options_.atlas.pageSize *= 2;
+    atlas = buildAtlas(scene_, options_.atlas, quiet);
   }
+  if (!atlas) return atlas.error();
+  if (options_.atlas.pageSize != asked)
+    study_.notes.push_back("the charts do not fit a page of " + std::to_string(asked) + "; one of " +
+                           std::to_string(options_.atlas.pageSize) + " is used");
+  ownUvs_ = std::any_of(atlas->report.sceneUvs.begin(), atlas->report.sceneUvs.end(),
+                        [](const UvReport& uv) { return uv.valid; }) &&
+            options_.atlas.uvSource != UvSource::Generate;
+  atlas_ = std::move(atlas->atlas);
   texels_ = findTexels(atlas_);
   study_.texelsPerMeter = atlas_.texelsPerMeter;
   for (const PageTexels& page : texels_) study_.texels += page.size();
+  return {};
+}
+
+/// By series, in the order of the tables; within one as they were measured.
+void Studying::sortPoints() {
+  const auto rank = [](const StudyPoint& p) {
+    constexpr std::array<std::string_view, 5> kOrder = {"gather", "denoised", "path", "projection", "density"};
+    return std::find(kOrder.begin(), kOrder.end(), p.series) - kOrder.begin();
+  };
+  std::stable_sort(study_.points.begin(), study_.points.end(),
+                   [&](const StudyPoint& a, const StudyPoint& b) { return rank(a) < rank(b); });
+}
+
+Expected<Study> Studying::run() {
+  if (auto done = makeAtlas(); !done) return done.error();
   if (auto done = pilot(); !done) return done.error();
   const auto samples = planReference();
   if (!samples) return samples.error();
@@ -452,7 +404,7 @@ Expected<Study> Studying::run() {
   progress_.begin("study", static_cast<std::uint64_t>(kProgressPerSecond * expected));
   if (auto done = makeReference(); !done) return done.error();
   for (Candidate& candidate : all) {
-    if (secondsUsed() + candidate.expected > budget) {
+    if (sinceStart_.seconds() + candidate.expected > budget) {
       study_.notes.push_back(candidate.point.series + " of " + std::to_string(candidate.point.samples) +
                              " samples left out: the time budget ends before");
       continue;
@@ -460,12 +412,7 @@ Expected<Study> Studying::run() {
     if (auto done = measure(candidate); !done) return done.error();
   }
   progress_.end();
-  const auto rank = [](const StudyPoint& p) {
-    constexpr std::array<std::string_view, 5> kOrder = {"gather", "denoised", "path", "projection", "density"};
-    return std::find(kOrder.begin(), kOrder.end(), p.series) - kOrder.begin();
-  };
-  std::stable_sort(study_.points.begin(), study_.points.end(),
-                   [&](const StudyPoint& a, const StudyPoint& b) { return rank(a) < rank(b); });
+  sortPoints();
   return std::move(study_);
 }
 

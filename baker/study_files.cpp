@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "baker/conventions.h"
 #include "baker/plot.h"
 #include "baker/version.h"
 #include "scene/file_set.h"
@@ -12,12 +13,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-const char* nameOf(Projection projection) {
-  return projection == Projection::Raw ? "raw" : projection == Projection::Flat ? "flat" : "fit";
-}
-
-const char* nameOf(Integrator integrator) { return integrator == Integrator::Gather ? "gather" : "path"; }
 
 std::string format(const char* how, double v) {
   char text[48];
@@ -87,7 +82,7 @@ Plot errorPlot(const Study& study, const std::string& title, const std::string& 
 }
 
 Plot densityPlot(const Study& study) {
-  PlotSeries series{"gather, " + std::string("flat map"), {}};
+  PlotSeries series{"gather, flat map", {}};
   for (const StudyPoint& p : study.points)
     if (p.seen >= 0.0) series.points.push_back({static_cast<double>(p.texels), 100.0 * p.seen, {}});
   return {"Error of the light as seen, by texel density", "texels", "relative RMSE, %", {std::move(series)}, {}};

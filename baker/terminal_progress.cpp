@@ -7,7 +7,7 @@
 namespace lumel {
 namespace {
 
-// A signal handler can reach nothing else than this.
+// A signal handler may write to nothing else.
 volatile std::sig_atomic_t stopRequested = 0;
 
 extern "C" void requestStop(int signal) {

@@ -214,6 +214,12 @@ TEST(Info, DescribesScenesImagesAndBakes) {
   EXPECT_EQ(json["triangles"], 2);
   EXPECT_EQ(json["materials"].size(), 1u);
   EXPECT_EQ(json["estimate"]["texels"], 400);  // 2 m x 2 m
+  // What cannot be seen gets no lightmap.
+  nlohmann::json glass = gltfOf({floorQuad()});
+  glass["materials"][0]["alphaMode"] = "BLEND";
+  glass["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {1.0, 1.0, 1.0, 0.0};
+  writeFile(dir / "glass.gltf", glass.dump());
+  EXPECT_EQ(nlohmann::json::parse(run({"info", dir / "glass.gltf", "--json"}).out, nullptr, false)["estimate"], nullptr);
   ASSERT_EQ(run({"bake", scene, "-o", dir / "out", "--samples", "1", "--page-size", "16", "--sky-color", "1", "1", "1"})
                 .exitCode,
             0);
