@@ -2,7 +2,6 @@
 // bounces, surfaces without texels, texels inside of things.
 #include <gtest/gtest.h>
 
-#include <cstring>
 #include <limits>
 #include <memory>
 #include <set>
@@ -275,20 +274,6 @@ TEST(Gather, IndirectOnlyIsAllLightLessTheDirect) {
       EXPECT_GT(path, 0.1 * total);
     }
   }
-}
-
-bool sameBytes(const Image& a, const Image& b) {
-  return a.pixels.size() == b.pixels.size() &&
-         std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(float)) == 0;
-}
-
-bool sameBytes(const BakeResult& a, const BakeResult& b) {
-  for (std::size_t p = 0; p < a.pages.size(); ++p) {
-    for (std::size_t i = 0; i < 3; ++i)
-      if (!sameBytes(a.pages[p].rnm[i], b.pages[p].rnm[i])) return false;
-    if (!sameBytes(a.pages[p].flat, b.pages[p].flat) || !sameBytes(a.pages[p].aux, b.pages[p].aux)) return false;
-  }
-  return a.stats.rays == b.stats.rays && a.stats.shadowRays == b.stats.shadowRays;
 }
 
 TEST(Gather, SameBytesForAnyThreadCount) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 
 #include "scene/parallel.h"
 
@@ -140,6 +141,11 @@ TestScene busyRoom(float scale, const Vec3& offset) {
 
 namespace {
 
+bool sameBytes(const Image& a, const Image& b) {
+  return a.pixels.size() == b.pixels.size() &&
+         std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(float)) == 0;
+}
+
 std::vector<Vec3d> clipAbove(const std::vector<Vec3d>& polygon, const Vec3d& axis) {
   std::vector<Vec3d> kept;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -153,6 +159,17 @@ std::vector<Vec3d> clipAbove(const std::vector<Vec3d>& polygon, const Vec3d& axi
 }
 
 }  // namespace
+
+bool sameBytes(const BakeResult& a, const BakeResult& b) {
+  if (a.pages.size() != b.pages.size()) return false;
+  for (std::size_t p = 0; p < a.pages.size(); ++p) {
+    for (std::size_t i = 0; i < 3; ++i)
+      if (!sameBytes(a.pages[p].rnm[i], b.pages[p].rnm[i])) return false;
+    if (!sameBytes(a.pages[p].flat, b.pages[p].flat) || !sameBytes(a.pages[p].aux, b.pages[p].aux)) return false;
+  }
+  return a.stats.rays == b.stats.rays && a.stats.shadowRays == b.stats.shadowRays &&
+         a.stats.meanFlat == b.stats.meanFlat && a.stats.projectionResidual == b.stats.projectionResidual;
+}
 
 double polygonLight(const Vec3d& p, const Vec3d& normal, const Vec3d& kernelAxis, std::vector<Vec3d> corners) {
   for (Vec3d& c : corners) c -= p;

@@ -43,6 +43,9 @@ struct TestScene {
   BakeResult bake(const BakeOptions& options, int threads = 0) const;
 };
 
+/// Whether two bakes have the same images, rays and figures to the bit.
+bool sameBytes(const BakeResult& a, const BakeResult& b);
+
 /// A room with every kind of light, a cut-out and instances.
 TestScene busyRoom(float scale = 1.0f, const Vec3& offset = Vec3(0.0f));
 

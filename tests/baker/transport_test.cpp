@@ -2,7 +2,6 @@
 // closed rooms, and the figures that it reports.
 #include <gtest/gtest.h>
 
-#include <cstring>
 
 #include "tests/baker/test_scene.h"
 
@@ -10,22 +9,6 @@ namespace lumel {
 namespace {
 
 using namespace testing_scene;
-
-bool sameBytes(const Image& a, const Image& b) {
-  return a.pixels.size() == b.pixels.size() &&
-         std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(float)) == 0;
-}
-
-bool sameBytes(const BakeResult& a, const BakeResult& b) {
-  if (a.pages.size() != b.pages.size()) return false;
-  for (std::size_t p = 0; p < a.pages.size(); ++p) {
-    for (std::size_t i = 0; i < 3; ++i)
-      if (!sameBytes(a.pages[p].rnm[i], b.pages[p].rnm[i])) return false;
-    if (!sameBytes(a.pages[p].flat, b.pages[p].flat) || !sameBytes(a.pages[p].aux, b.pages[p].aux)) return false;
-  }
-  return a.stats.rays == b.stats.rays && a.stats.shadowRays == b.stats.shadowRays &&
-         a.stats.meanFlat == b.stats.meanFlat && a.stats.projectionResidual == b.stats.projectionResidual;
-}
 
 TEST(Transport, SameBytesForAnyThreadCount) {
   const TestScene test = busyRoom();
