@@ -7,18 +7,12 @@
 
 #include "baker/baked_scene.h"
 #include "scene/file_set.h"
+#include "tests/scratch.h"
 
 namespace lumel {
 namespace {
 
 namespace fs = std::filesystem;
-
-fs::path scratch() {
-  const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-  const fs::path dir = fs::path(testing::TempDir()) / (std::string("lumel-files-") + info->name());
-  fs::remove_all(dir);
-  return dir;
-}
 
 /// A bake of nothing with so many pages of 8 x 4 texels, all covered, of one value.
 struct Fixture {
@@ -161,7 +155,7 @@ TEST(BakeFiles, DamagedResultsAreNamed) {
 }
 
 TEST(BakeFiles, CheckWritableLeavesNothing) {
-  const fs::path dir = scratch();
+  const fs::path dir = scratch() / "new";
   EXPECT_TRUE(checkWritable(dir / "a" / "b"));
   EXPECT_FALSE(fs::exists(dir));
   fs::create_directories(dir);

@@ -10,6 +10,7 @@
 
 #include "scene/image_io.h"
 #include "scene/load_scene.h"
+#include "tests/scratch.h"
 
 namespace lumel {
 namespace {
@@ -64,9 +65,7 @@ struct Fixture {
 
   Scene roundTrip() const {
     const std::string glb = encoded();
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    const fs::path dir = fs::path(testing::TempDir()) / (std::string("lumel-glb-") + info->name());
-    fs::create_directories(dir);
+    const fs::path dir = scratch();
     std::ofstream(dir / "scene.glb", std::ios::binary)
         .write(glb.data(), static_cast<std::streamsize>(glb.size()));
     auto loaded = loadScene(dir / "scene.glb");

@@ -145,15 +145,6 @@ std::optional<Outcome> runOnTerminal(const std::vector<std::string>& arguments, 
   return outcome;
 }
 
-fs::path scratch() {
-  const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-  const fs::path dir = fs::path(testing::TempDir()) / ("lumel-cli-" + std::to_string(getpid())) /
-                       (std::string(info->test_suite_name()) + "." + info->name());
-  fs::remove_all(dir);
-  fs::create_directories(dir);
-  return dir;
-}
-
 std::string readFile(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   EXPECT_TRUE(in.is_open()) << file;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "scene/math.h"
+#include "tests/scratch.h"
 
 namespace lumel::cli {
 
@@ -38,9 +39,6 @@ Outcome runAndInterrupt(const std::vector<std::string>& arguments, const std::st
 /// The same, once it has used so much CPU time: a loaded machine delays the signal as it delays the work.
 Outcome runAndInterrupt(const std::vector<std::string>& arguments, double cpuSeconds, int signal,
                         const Surroundings& surroundings = {});
-
-/// An empty folder of the running test.
-std::filesystem::path scratch();
 
 std::string readFile(const std::filesystem::path& file);
 void writeFile(const std::filesystem::path& file, const std::string& content);

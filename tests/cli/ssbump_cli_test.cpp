@@ -25,7 +25,7 @@ struct Ran {
 class SsbumpCli : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = cli::scratch();
+    folder_ = scratch();
     const HeightField field = fields::fractal(64, 64, 1, 4);
     Image grey(64, 64, 1);
     grey.pixels = field.texels;

@@ -7,6 +7,8 @@
 #include <iterator>
 #include <map>
 
+#include "tests/scratch.h"
+
 namespace lumel {
 namespace {
 
@@ -15,12 +17,9 @@ namespace fs = std::filesystem;
 class FileSets : public testing::Test {
  protected:
   void SetUp() override {
-    dir_ = fs::path(testing::TempDir()) / ("lumel-file-set-" + std::to_string(getpid())) /
-           testing::UnitTest::GetInstance()->current_test_info()->name();
-    fs::remove_all(dir_);
+    dir_ = scratch();
     fs::create_directories(dir_ / "other");
   }
-  void TearDown() override { fs::remove_all(dir_); }
 
   void put(const fs::path& name, const std::string& text) const { std::ofstream(dir_ / name) << text; }
   void add(FileSet& set, const fs::path& name, const std::string& text) const {

@@ -9,18 +9,12 @@
 #include "scene/image_io.h"
 #include "scene/math.h"
 #include "scene/parallel.h"
+#include "tests/scratch.h"
 
 namespace lumel {
 namespace {
 
 namespace fs = std::filesystem;
-
-fs::path scratch(const std::string& name) {
-  const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-  const fs::path dir = fs::path(testing::TempDir()) / (std::string("lumel-") + info->name());
-  fs::create_directories(dir);
-  return dir / name;
-}
 
 TEST(ParallelFor, CoversEveryItemOnceInBlocksOfTheGrain) {
   for (int threads : {1, 2}) {
@@ -57,7 +51,7 @@ TEST(Frame, DegenerateTangentsFallBackToAFrameAboutTheNormal) {
 TEST(ImageIo, ExrRoundTripKeepsFloatsAndMetadata) {
   Image image(3, 2, 3);
   for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = static_cast<float>(i) * 1e5f + 0.125f;
-  const fs::path file = scratch("a.exr");
+  const fs::path file = scratch() / "a.exr";
   WriteImageOptions options;
   options.metadata["lumel:decode"] = "squared";
   ASSERT_TRUE(writeImage(file, image, options));
@@ -82,8 +76,7 @@ TEST(ImageIo, PngInMemoryRoundTrips) {
 TEST(ImageIo, PartsMakeTheSameFileAndAnUnfinishedOneLeavesNothing) {
   Image image(5, 7, 3);
   for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = static_cast<float>(i) / 128;
-  fs::remove_all(scratch("").parent_path());  // what an earlier run has left
-  const fs::path whole = scratch("whole.png"), parts = scratch("parts.png");
+  const fs::path whole = scratch() / "whole.png", parts = scratch() / "parts.png";
   const WriteImageOptions options{.format = PixelFormat::U16, .channelNames = {}, .metadata = {}};
   ASSERT_TRUE(writeImage(whole, image, options));
   const auto rows = [&](int first, int count) {
@@ -135,7 +128,7 @@ TEST(ImageIo, GifInMemoryIsRead) {
 TEST(ImageIo, HalfOverflowAndNanFailLoudlyAndLeaveNoFile) {
   Image image(2, 1, 3, 1.0f);
   image.pixels[4] = 70000.0f;
-  const fs::path file = scratch("b.exr");
+  const fs::path file = scratch() / "b.exr";
   WriteImageOptions half;
   half.format = PixelFormat::Half;
   auto result = writeImage(file, image, half);
@@ -158,7 +151,7 @@ TEST(ImageIo, CutOffFilesOfAnyFormatAreErrors) {
   std::uint32_t state = 1;  // noise: every row takes its share of the file
   for (float& v : image.pixels) v = static_cast<float>((state = state * 1664525 + 1013904223) >> 24) / 255.0f;
   for (const char* name : {"cut.png", "cut.jpg", "cut.tga", "cut.tif", "cut.exr", "cut.hdr", "cut.bmp", "cut.webp"}) {
-    const fs::path file = scratch(name);
+    const fs::path file = scratch() / name;
     const bool isFloat = file.extension() == ".exr" || file.extension() == ".hdr";
     ASSERT_TRUE(writeImage(file, image,
                            {.format = isFloat ? PixelFormat::Float : PixelFormat::U8, .channelNames = {}, .metadata = {}}))

@@ -7,6 +7,7 @@
 
 #include "scene/load_scene.h"
 #include "tests/scene/gltf_builder.h"
+#include "tests/scratch.h"
 
 namespace lumel {
 namespace {
@@ -133,8 +134,7 @@ TEST(GltfErrors, TransformsThatOverflow) {
 class GltfFiles : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / (std::string("lumel-gltf-") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
+    folder_ = scratch();
     fs::create_directories(folder_ / "scene");
     builder_.square();
   }

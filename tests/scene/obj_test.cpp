@@ -8,6 +8,7 @@
 #include "scene/obj_loader.h"
 #include "scene/polygon.h"
 #include "scene/texture.h"
+#include "tests/scratch.h"
 
 namespace lumel {
 namespace {
@@ -17,8 +18,7 @@ namespace fs = std::filesystem;
 class Obj : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / (std::string("lumel-obj-") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
+    folder_ = scratch();
     fs::create_directories(folder_ / "scene");
   }
   void write(const std::string& name, const std::string& text) { std::ofstream(folder_ / "scene" / name, std::ios::binary) << text; }

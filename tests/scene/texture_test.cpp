@@ -5,6 +5,7 @@
 #include "scene/environment.h"
 #include "scene/image_io.h"
 #include "scene/texture.h"
+#include "tests/scratch.h"
 
 namespace lumel {
 namespace {
@@ -156,8 +157,7 @@ TEST(Environment, OrientationAsDocumented) {
 }
 
 TEST(Environment, FilesAreCheckedPixelByPixel) {
-  const fs::path folder = fs::path(testing::TempDir()) / "lumel-environment";
-  fs::create_directories(folder);
+  const fs::path folder = scratch();
   Image sky(4, 2, 3, 1.5f);
   ASSERT_TRUE(writeImage(folder / "good.exr", sky));
   ASSERT_TRUE(writeImage(folder / "good.hdr", sky));

@@ -7,6 +7,7 @@
 #include "ssbump/basis_file.h"
 #include "ssbump/bilateral.h"
 #include "ssbump/weights.h"
+#include "tests/scratch.h"
 #include "tests/ssbump/fields.h"
 
 #include <filesystem>
@@ -139,8 +140,7 @@ TEST(Bilateral, LeavesFlatFieldsAloneAndWraps) {
 }
 
 TEST(BasisFile, ReadsUnitVectorsAndNamesBadLines) {
-  const auto folder = std::filesystem::path(testing::TempDir()) / "lumel-basis-file";
-  std::filesystem::create_directories(folder);
+  const auto folder = scratch();
   const auto write = [&](const char* text) {
     std::ofstream(folder / "basis.txt") << text;
     return readBasis(folder / "basis.txt");

@@ -10,6 +10,7 @@
 #include "ssbump/convert.h"
 #include "ssbump/mip.h"
 #include "ssbump/study.h"
+#include "tests/scratch.h"
 #include "tests/ssbump/fields.h"
 
 namespace lumel::ssbump {
@@ -20,10 +21,7 @@ namespace fs = std::filesystem;
 class Maps : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) /
-              (std::string("lumel-ssbump-") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
+    folder_ = scratch();
   }
   fs::path path(const std::string& name) const { return folder_ / name; }
 
