@@ -8,6 +8,7 @@
 #include <iterator>
 #include <sstream>
 
+#include "baker/command_line.h"
 #include "scene/image_io.h"
 #include "tests/cli/harness.h"
 #include "tests/ssbump/fields.h"
@@ -104,7 +105,10 @@ TEST_F(SsbumpCli, ConvertsThereAndBack) {
   for (std::size_t i = 0; i < d.pixels.size(); ++i) ASSERT_NEAR(d.pixels[i], g.pixels[i], 1e-5);
 }
 
+// Within this process: starting the program takes longer than refusing a command line.
 TEST_F(SsbumpCli, TheCommandLineIsChecked) {
+  const fs::path before = fs::current_path();
+  fs::current_path(folder_);
   for (const char* wrong :
        {"", "h.png", "h.png -o s.png --method guess", "h.png -o s.png --rays 0", "h.png -o s.png --azimuths -1",
         "h.png -o s.png --height-scale tall", "h.png -o s.png --convention cubed", "h.png -o s.jpeg2 ",
@@ -115,11 +119,17 @@ TEST_F(SsbumpCli, TheCommandLineIsChecked) {
         "h.png -o s.png --blocks bc1", "h.png -o s.png --to linear", "h.png -o s.png --cone-angle 60",
         "s.png --convert -o n.png --save-ao ao.png", "s.png --convert --convention linear -o n.png",
         "tile.obj -o s.png --invert", "tile.obj -o s.png --tile-width 2", "tile.obj -o s.png --study study"}) {
-    const Ran ran = lumel(wrong);
-    EXPECT_EQ(ran.code, 2) << wrong << "\n" << ran.output;
-    EXPECT_NE(ran.output.find("lumel"), std::string::npos) << wrong;
+    std::ostringstream out;
+    const auto done = runCommandLine(words(wrong), out);
+    ASSERT_FALSE(done) << wrong;
+    EXPECT_EQ(done.error().kind, ErrorKind::Usage) << wrong << "\n" << done.error().message;
+    EXPECT_FALSE(done.error().message.empty()) << wrong;
     EXPECT_EQ(files(), 1u) << wrong;
   }
+  fs::current_path(before);
+  const Ran ran = lumel("h.png -o s.png --method guess");
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_NE(ran.output.find("lumel: "), std::string::npos) << ran.output;
   EXPECT_EQ(lumel("--help").code, 0);
 }
 
