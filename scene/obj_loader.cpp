@@ -56,20 +56,17 @@ class ShapeBuilder {
     return file_.positions[static_cast<std::size_t>(corner(face, k).position)];
   }
 
-  /// Newell's normal: twice the area of the (perhaps not quite planar) polygon.
-  Vec3d areaVector(const ObjFace& face) const {
-    Vec3d sum(0);
-    const Vec3d origin(position(face, 0));
-    for (std::size_t k = 1; k + 1 < face.corners; ++k)
-      sum += glm::cross(Vec3d(position(face, k)) - origin, Vec3d(position(face, k + 1)) - origin);
-    return sum;
+  std::vector<Vec3> positionsOf(const ObjFace& face) const {
+    std::vector<Vec3> positions;
+    for (std::size_t k = 0; k < face.corners; ++k) positions.push_back(position(face, k));
+    return positions;
   }
 
   /// Per smoothing group and vertex, the faces' normals weighted by area and the corner's angle.
   void sumSmoothNormals() {
     for (const ObjFace& face : shape_.faces) {
       if (face.smoothingGroup == 0) continue;
-      const Vec3d area = areaVector(face);
+      const Vec3d area = newellNormal(positionsOf(face));
       for (std::size_t k = 0; k < face.corners; ++k) {
         const Vec3d p(position(face, k));
         const Vec3d a = Vec3d(position(face, (k + 1) % face.corners)) - p;
@@ -92,8 +89,7 @@ class ShapeBuilder {
   }
 
   void addFace(const ObjFace& face) {
-    std::vector<Vec3> corners;
-    for (std::size_t k = 0; k < face.corners; ++k) corners.push_back(position(face, k));
+    const std::vector<Vec3> corners = positionsOf(face);
     const int material = face.material >= 0 ? face.material : defaultMaterial_;
     Part& part = parts_[material];
     part.primitive.material = material;

@@ -8,15 +8,6 @@ namespace {
 
 using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 
-/// Newell's method: the sum of the projected areas on the three coordinate planes.
-Vec3d newellNormal(std::span<const Vec3> corners) {
-  Vec3d normal(0);
-  const Vec3d origin(corners[0]);
-  for (std::size_t i = 0; i < corners.size(); ++i)
-    normal += glm::cross(Vec3d(corners[i]) - origin, Vec3d(corners[(i + 1) % corners.size()]) - origin);
-  return normal;
-}
-
 bool contains(const Vec2d& a, const Vec2d& b, const Vec2d& c, const Vec2d& p) {
   return signedArea(a, b, p) >= 0 && signedArea(b, c, p) >= 0 && signedArea(c, a, p) >= 0;
 }
@@ -40,6 +31,14 @@ bool isEar(const std::vector<Vec2d>& p, const std::vector<std::uint32_t>& left, 
 }
 
 }  // namespace
+
+Vec3d newellNormal(std::span<const Vec3> corners) {
+  Vec3d normal(0);
+  const Vec3d origin(corners[0]);
+  for (std::size_t i = 0; i < corners.size(); ++i)
+    normal += glm::cross(Vec3d(corners[i]) - origin, Vec3d(corners[(i + 1) % corners.size()]) - origin);
+  return normal;
+}
 
 Triangles triangulatePolygon(std::span<const Vec3> corners) {
   if (corners.size() < 3) return {};
