@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <functional>
 
-#include "lightmap/rnm_basis.h"
-
 namespace lumel::ssbump {
 namespace {
 
@@ -19,15 +17,6 @@ Image panel(const Image& source, int side, const Progress& progress, const std::
 }
 
 }  // namespace
-
-float litBy(const Vec3& s, const Vec3& l) {
-  float sum = 0;
-  for (int i = 0; i < 3; ++i) {
-    const float d = std::max(0.0f, glm::dot(l, kRnmBasis[static_cast<std::size_t>(i)]));
-    sum += s[i] * d * d;
-  }
-  return sum;
-}
 
 Image panelGrid(std::span<const Image> panels, int columns) {
   if (panels.empty()) return {};

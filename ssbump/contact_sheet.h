@@ -12,10 +12,6 @@ namespace lumel::ssbump {
 /// Three-channel panels of one size, left to right and top to bottom, with a grey gap.
 Image panelGrid(std::span<const Image> panels, int columns);
 
-/// The light that an ssbump texel (squared, right-handed) sends back to a directional light from direction l (unit,
-/// tangent space): sum s_i max(0, l.B_i)^2, before albedo.
-float litBy(const Vec3& s, const Vec3& l);
-
 /// Two rows of four panels, each at most `side` wide: heights, normals, weights without occlusion, weights with
 /// occlusion; recovered normals, ambient occlusion, lit from the right, lit from the top. Weights are shown times 1.5
 /// (flat is mid grey). 8-bit PNG or any other image type. Errors: those of the bake and of writing.

@@ -88,6 +88,15 @@ Vec3 recoveredNormal(const Vec3& s, Convention convention) {
   return length > 0 && std::isfinite(length) ? n / length : Vec3(0, 0, 1);
 }
 
+float litBy(const Vec3& s, const Vec3& l) {
+  float sum = 0;
+  for (int i = 0; i < 3; ++i) {
+    const float d = std::max(0.0f, glm::dot(l, kRnmBasis[static_cast<std::size_t>(i)]));
+    sum += s[i] * d * d;
+  }
+  return sum;
+}
+
 Vec3 convert(const Vec3& s, const Encoding& from, const Encoding& to) {
   const Vec3 squared = toSquared(from.hand == Hand::Left ? swapHand(s) : s, from.convention);
   const Vec3 out = fromSquared(squared, to.convention);

@@ -45,6 +45,10 @@ Vec3 normalWeights(const Vec3& n, Convention convention = Convention::Squared);
 /// Squared: normalise(sum sqrt(s_i) B_i); Linear: normalise(sum s_i B_i).
 Vec3 recoveredNormal(const Vec3& s, Convention convention = Convention::Squared);
 
+/// The light that an ssbump texel (squared, right-handed) sends back to a directional light from direction l (unit,
+/// tangent space): sum s_i max(0, l.B_i)^2, before albedo.
+float litBy(const Vec3& s, const Vec3& l);
+
 /// One texel from one encoding to another. Exact for evenly shadowed texels, and reversible for all of them:
 /// squared from linear is s_i^2 / |s|, linear from squared is sqrt(s_i * sum s). Keeps the recovered normal.
 Vec3 convert(const Vec3& s, const Encoding& from, const Encoding& to);
