@@ -62,6 +62,21 @@ void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart) {
   chart.points.shrink_to_fit();
 }
 
+TriangleSteps stepsFrom(const ChartMesh& chart, std::uint32_t seed) {
+  constexpr std::uint32_t kNotReached = 0xffffffffu;
+  TriangleSteps steps{std::vector<std::uint32_t>(chart.triangles.size(), kNotReached)};
+  std::vector<std::uint32_t> queue = {seed};
+  steps.distance[seed] = 0;
+  for (std::size_t head = 0; head < queue.size(); ++head)
+    for (const std::int32_t n : chart.neighbours[queue[head]])
+      if (n >= 0 && steps.distance[static_cast<std::size_t>(n)] == kNotReached) {
+        steps.distance[static_cast<std::size_t>(n)] = steps.distance[queue[head]] + 1;
+        queue.push_back(static_cast<std::uint32_t>(n));
+      }
+  steps.farthest = queue.back();
+  return steps;
+}
+
 FlatTriangle layFlat(const std::array<Vec3d, 3>& corners) {
   const Vec3d a = corners[1] - corners[0];
   const Vec3d b = corners[2] - corners[0];

@@ -25,6 +25,13 @@ ChartMesh makeChartMesh(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> tri
 /// Sets `triangles` and `points` from `meshTriangles` and `neighbours`: corners that meet over a joined edge are one point.
 void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart);
 
+/// Breadth-first over joined edges from a triangle. A chart is connected: every triangle is reached.
+struct TriangleSteps {
+  std::vector<std::uint32_t> distance;  // per triangle
+  std::uint32_t farthest = 0;           // the last one reached
+};
+TriangleSteps stepsFrom(const ChartMesh& chart, std::uint32_t seed);
+
 /// A triangle laid into the plane without distortion: corner 0 at the origin, corner 1 on the x axis, corner 2 above.
 struct FlatTriangle {
   double x1 = 0, x2 = 0, y2 = 0;

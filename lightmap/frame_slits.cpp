@@ -1,7 +1,6 @@
 #include "lightmap/frame_slits.h"
 
 #include <algorithm>
-#include <limits>
 
 namespace lumel {
 namespace {
@@ -25,20 +24,6 @@ bool findClosed(const FlatChart& chart, const FrameBreak& edge, double gap, Slit
   const Vec2d start = uv(slit.a, edge.cornerA % 3) - uv(slit.b, edge.cornerB % 3 + 1);
   const Vec2d end = uv(slit.a, edge.cornerA % 3 + 1) - uv(slit.b, edge.cornerB % 3);
   return glm::length(start) < gap && glm::length(end) < gap;
-}
-
-/// Steps over joined edges from a triangle.
-std::vector<std::uint32_t> stepsFrom(const ChartMesh& chart, std::uint32_t seed) {
-  std::vector<std::uint32_t> distance(chart.triangles.size(), std::numeric_limits<std::uint32_t>::max());
-  std::vector<std::uint32_t> queue = {seed};
-  distance[seed] = 0;
-  for (std::size_t head = 0; head < queue.size(); ++head)
-    for (const std::int32_t n : chart.neighbours[queue[head]])
-      if (n >= 0 && distance[static_cast<std::size_t>(n)] == std::numeric_limits<std::uint32_t>::max()) {
-        distance[static_cast<std::size_t>(n)] = distance[queue[head]] + 1;
-        queue.push_back(static_cast<std::uint32_t>(n));
-      }
-  return distance;
 }
 
 /// The part of the chart for which keep[triangle] == which, with the UVs that it has.
@@ -88,8 +73,8 @@ std::vector<FlatChart> splitAtFrameSlits(const HalfEdgeMesh& mesh, std::vector<F
     if (c != chartOf[edge.cornerB / 3]) continue;
     const double gap = surfaceArea(charts[c].mesh) < kTinyTexels ? smallGap : kFrameGap;
     if (!findClosed(charts[c], edge, gap, slit)) continue;
-    const std::vector<std::uint32_t> fromA = stepsFrom(charts[c].mesh, slit.a);
-    const std::vector<std::uint32_t> fromB = stepsFrom(charts[c].mesh, slit.b);
+    const std::vector<std::uint32_t> fromA = stepsFrom(charts[c].mesh, slit.a).distance;
+    const std::vector<std::uint32_t> fromB = stepsFrom(charts[c].mesh, slit.b).distance;
     std::vector<bool> nearA(fromA.size());
     for (std::size_t t = 0; t < nearA.size(); ++t) nearA[t] = fromA[t] <= fromB[t];
     FlatChart other = part(charts[c], nearA, false);

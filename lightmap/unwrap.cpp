@@ -12,31 +12,13 @@
 namespace lumel {
 namespace {
 
-/// Triangles of `chart` by distance in steps from `seed`; -1 is not reached.
-std::vector<int> steps(const ChartMesh& chart, std::uint32_t seed, std::uint32_t& farthest) {
-  std::vector<int> distance(chart.triangles.size(), -1);
-  std::vector<std::uint32_t> queue = {seed};
-  distance[seed] = 0;
-  for (std::size_t head = 0; head < queue.size(); ++head)
-    for (const std::int32_t n : chart.neighbours[queue[head]])
-      if (n >= 0 && distance[static_cast<std::size_t>(n)] < 0) {
-        distance[static_cast<std::size_t>(n)] = distance[queue[head]] + 1;
-        queue.push_back(static_cast<std::uint32_t>(n));
-      }
-  farthest = queue.back();
-  return distance;
-}
-
 /// Two connected halves: what is nearer to one end of the chart than to the other.
 std::array<std::vector<std::uint32_t>, 2> halve(const ChartMesh& chart) {
-  std::uint32_t one = 0, other = 0;
-  steps(chart, 0, one);
-  const std::vector<int> fromOne = steps(chart, one, other);
-  std::uint32_t unused = 0;
-  const std::vector<int> fromOther = steps(chart, other, unused);
+  const TriangleSteps fromOne = stepsFrom(chart, stepsFrom(chart, 0).farthest);
+  const TriangleSteps fromOther = stepsFrom(chart, fromOne.farthest);
   std::array<std::vector<std::uint32_t>, 2> halves;
   for (std::uint32_t t = 0; t < chart.triangles.size(); ++t)
-    halves[fromOne[t] <= fromOther[t] ? 0 : 1].push_back(chart.meshTriangles[t]);
+    halves[fromOne.distance[t] <= fromOther.distance[t] ? 0 : 1].push_back(chart.meshTriangles[t]);
   return halves;
 }
 
