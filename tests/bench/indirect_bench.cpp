@@ -128,8 +128,9 @@ void indirect(benchmark::State& state, Where where, int referenceSamples) {
     };
     const std::vector<Point> path = curveOf(Integrator::Path, "path", {64, 256, 1024, 2048});
     const std::vector<Point> gather = curveOf(Integrator::Gather, "gather", {16, 32, 64, 128, 256, 512, 1024});
-    // What a bake hands out. Not a comparison of methods: paths could be denoised too.
+    // What a bake hands out, and paths treated the same way.
     const std::vector<Point> denoised = curveOf(Integrator::Gather, "denoised", {16, 32, 64, 128, 256}, true);
+    const std::vector<Point> denoisedPath = curveOf(Integrator::Path, "denoised_path", {16, 32, 64, 128, 256}, true);
     // Rays where they are needed: more samples where texels are still far from the target.
     std::vector<Point> targeted;
     for (const int permille : {80, 40, 30, 20, 15})
@@ -140,6 +141,7 @@ void indirect(benchmark::State& state, Where where, int referenceSamples) {
       state.counters["path_rays_" + label] = raysFor(0.01 * percent, path);
       state.counters["gather_rays_" + label] = raysFor(0.01 * percent, gather);
       state.counters["denoised_rays_" + label] = raysFor(0.01 * percent, denoised);
+      state.counters["denoised_path_rays_" + label] = raysFor(0.01 * percent, denoisedPath);
       state.counters["targeted_rays_" + label] = raysFor(0.01 * percent, targeted);
       state.counters["fewer_" + label] = raysFor(0.01 * percent, path) / raysFor(0.01 * percent, gather);
     }
