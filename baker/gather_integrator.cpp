@@ -20,11 +20,12 @@ constexpr std::uint32_t kFirstJudged = 32;
 constexpr std::ptrdiff_t kMostUnmetAround = 3;
 /// Without a target a texel is done at kSettledError * N^kSettledRate times the root of its light and the mean light, N
 /// being all samples: what is seen of an error goes with the root of the light, and a texel of mean light has about
-/// this error after N samples.
+/// this error after N samples. In the dark, where somebody may stand whose eyes have adapted, at no more than
+/// kSettledInDark times as much relative to its light; below kSettledFloor of the mean it is night.
 constexpr double kSettledError = 0.4;
 constexpr double kSettledRate = -0.6;
-/// Texels darker than this share of the mean are judged as if they were so bright.
-constexpr double kSettledFloor = 0.02;
+constexpr double kSettledInDark = 5.0;
+constexpr double kSettledFloor = 1e-3;
 /// Calibrated: 93 to 97% of texels lie within 1.96 standard errors.
 constexpr double kGatherCredit = 0.5;
 /// Endless light: the warm-up ends where another bounce adds less than this share, or after so many.
@@ -436,8 +437,10 @@ double GatherIntegrator::markDone() {
   const double mean = darkFloor(1.0);
   const double settled = kSettledError * std::pow(static_cast<double>(options_.samples), kSettledRate);
   const auto goal = [&](double light) {
-    return options_.targetError > 0.0f ? static_cast<double>(options_.targetError) * std::max(light, kDarkFloor * mean)
-                                       : settled * std::sqrt(std::max(light, kSettledFloor * mean) * mean);
+    if (options_.targetError > 0.0f)
+      return static_cast<double>(options_.targetError) * std::max(light, kDarkFloor * mean);
+    light = std::max(light, kSettledFloor * mean);
+    return settled * std::min(std::sqrt(light * mean), kSettledInDark * light);
   };
   std::size_t met = 0;
   std::vector<std::uint8_t> meets(waves_.size());
