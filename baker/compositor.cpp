@@ -174,10 +174,7 @@ void Compositor::Impl::collectShapes() {
       if (primitive.indices.empty()) continue;
       shape.linear = Mat3(instance.worldFromObject);
       shape.mirrored = glm::determinant(shape.linear) < 0.0f;
-      shape.normalMatrix =
-          Mat3(glm::cross(shape.linear[1], shape.linear[2]), glm::cross(shape.linear[2], shape.linear[0]),
-               glm::cross(shape.linear[0], shape.linear[1])) *
-          (shape.mirrored ? -1.0f : 1.0f);
+      shape.normalMatrix = cofactorMatrix(shape.linear) * (shape.mirrored ? -1.0f : 1.0f);
       for (const Vec3& p : primitive.positions) {
         shape.positions.push_back(Vec3(instance.worldFromObject * Vec4(p, 1.0f)));
         least = glm::min(least, shape.positions.back());

@@ -34,11 +34,11 @@ int wrapTexel(std::int64_t i, int size, Wrap mode) {
     case Wrap::Clamp:
       return static_cast<int>(std::clamp<std::int64_t>(i, 0, n - 1));
     case Wrap::Mirror: {
-      const std::int64_t m = ((i % (2 * n)) + 2 * n) % (2 * n);
+      const std::int64_t m = wrapIndex(i, 2 * n);
       return static_cast<int>(m < n ? m : 2 * n - 1 - m);
     }
     default:
-      return static_cast<int>(((i % n) + n) % n);
+      return static_cast<int>(wrapIndex(i, n));
   }
 }
 
