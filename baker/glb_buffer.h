@@ -34,7 +34,8 @@ class GlbBuffer {
   int addView(const void* data, std::size_t size, int target);
   int addAccessor(int view, int componentType, const char* type, std::size_t count);
 
-  std::vector<std::vector<std::uint8_t>> pieces_;  // one buffer that grows would be moved, and held twice, again and again
+  // One buffer that grows would be moved, and held twice, again and again.
+  std::vector<std::vector<std::uint8_t>> pieces_;
   std::size_t size_ = 0;
   Json bufferViews_ = Json::array();
   Json accessors_ = Json::array();

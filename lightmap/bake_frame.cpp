@@ -31,8 +31,9 @@ double cornerAngle(Vec3d p, Vec3d a, Vec3d b) {
   return std::atan2(glm::length(glm::cross(a - p, b - p)), glm::dot(a - p, b - p));
 }
 
-/// dP/du of a triangle, unit, and the handedness of (dP/du, up in the image, n). Returns how far it can be trusted, 0 .. 1:
-/// float UVs are rounded to 6e-8 of the page, so the direction in a triangle thinner than 100 such steps is noise.
+/// dP/du of a triangle, unit, and the handedness of (dP/du, up in the image, n). Returns how far it can be
+/// trusted, 0..1: float UVs are rounded to 6e-8 of the page, so the direction in a triangle thinner than 100 such steps
+/// is noise.
 double uvTangent(const std::array<Vec3d, 3>& p, const std::array<Vec2d, 3>& uv, Vec3d& t, double& handedness) {
   const Vec2d e1 = uv[1] - uv[0];
   const Vec2d e2 = uv[2] - uv[0];

@@ -122,7 +122,8 @@ RnmKernels::RnmKernels(Projection projection) : projection_(projection) {
       const Vec3 k = fitKernels(matrix_, table_, dir);
       most = std::max({most, k.x, k.y, k.z});
     }
-  // Kernels change by at most 4 per radian (they sum to 3 w.z and their table is less steep), half a step is below 0.003.
+  // Kernels change by at most 4 per radian (they sum to 3 w.z and their table is less steep); half a step is below
+  // 0.003.
   bound_ = most + 0.012f;
 }
 

@@ -11,6 +11,7 @@
 #include "baker/command_line.h"
 #include "scene/image_io.h"
 #include "tests/cli/harness.h"
+#include "tests/mentions.h"
 #include "tests/ssbump/fields.h"
 
 namespace lumel::ssbump {
@@ -67,7 +68,7 @@ TEST_F(SsbumpCli, WritesEveryMapThatIsAskedFor) {
   for (const char* name :
        {"s.png", "w.tif", "o.tga", "ao.png", "n.png", "r.exr", "sheet.png", "study/study.md", "study/study.png"})
     EXPECT_TRUE(exists(name)) << name;
-  EXPECT_NE(ran.output.find("64x64"), std::string::npos);
+  EXPECT_TRUE(mentions(ran.output, "64x64"));
 }
 
 TEST_F(SsbumpCli, BothMethodsAndAllFormatsAgree) {
@@ -129,7 +130,7 @@ TEST_F(SsbumpCli, TheCommandLineIsChecked) {
   fs::current_path(before);
   const Ran ran = lumel("h.png -o s.png --method guess");
   EXPECT_EQ(ran.code, 2);
-  EXPECT_NE(ran.output.find("lumel: "), std::string::npos) << ran.output;
+  EXPECT_TRUE(mentions(ran.output, "lumel: "));
   EXPECT_EQ(lumel("--help").code, 0);
 }
 
@@ -196,9 +197,9 @@ TEST_F(SsbumpCli, ProgressOnATerminalOnly) {
   const auto terminal = cli::runOnTerminal(work, {.folder = folder_});
   if (!terminal) GTEST_SKIP() << "no pseudo-terminal here";
   EXPECT_EQ(terminal->exitCode, 0) << terminal->out;
-  EXPECT_NE(terminal->out.find("ssbump "), std::string::npos) << terminal->out;
-  EXPECT_NE(terminal->out.find("% "), std::string::npos) << terminal->out;
-  EXPECT_NE(terminal->out.find(" left"), std::string::npos) << terminal->out;
+  EXPECT_TRUE(mentions(terminal->out, "ssbump "));
+  EXPECT_TRUE(mentions(terminal->out, "% "));
+  EXPECT_TRUE(mentions(terminal->out, " left"));
   const cli::Outcome piped = cli::run(words("h.png -o s.png --method rays --rays 2000 -q"), {.folder = folder_});
   EXPECT_EQ(piped.exitCode, 0);
   EXPECT_EQ(piped.out + piped.err, "");

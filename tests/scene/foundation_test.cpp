@@ -9,6 +9,7 @@
 #include "scene/image_io.h"
 #include "scene/math.h"
 #include "scene/parallel.h"
+#include "tests/mentions.h"
 #include "tests/scratch.h"
 
 namespace lumel {
@@ -133,7 +134,7 @@ TEST(ImageIo, HalfOverflowAndNanFailLoudlyAndLeaveNoFile) {
   half.format = PixelFormat::Half;
   auto result = writeImage(file, image, half);
   ASSERT_FALSE(result);
-  EXPECT_NE(result.error().message.find("65504"), std::string::npos);
+  EXPECT_TRUE(mentions(result.error().message, "65504"));
   image.pixels[4] = NAN;
   EXPECT_FALSE(writeImage(file, image));
   EXPECT_FALSE(fs::exists(file));
@@ -169,9 +170,9 @@ TEST(ImageIo, CutOffFilesOfAnyFormatAreErrors) {
       for (const auto& cut : {readImage(file), readImage(std::span(bytes).first(length), "memory")}) {
         ASSERT_FALSE(cut) << name << " cut to " << length << " of " << bytes.size();
         EXPECT_EQ(cut.error().kind, ErrorKind::Input);
-        EXPECT_EQ(cut.error().message.find('\n'), std::string::npos) << cut.error().message;
+        EXPECT_FALSE(mentions(cut.error().message, "\n"));
       }
-      EXPECT_NE(readImage(file).error().message.find(file.string()), std::string::npos);
+      EXPECT_TRUE(mentions(readImage(file).error().message, file.string()));
       std::ofstream(file, std::ios::binary)
           .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     }

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "tests/mentions.h"
 #include "tests/scene/gltf_samples.h"
 
 namespace lumel {
@@ -45,12 +46,12 @@ TEST(GltfMeshopt, DamageIsAnErrorThatNamesTheView) {
     auto result = g.load();
     return result ? std::string("(it loads)") : result.error().message;
   };
-  EXPECT_NE(message([](Json& e) { e["byteLength"] = 40; }).find("test.glb: bufferViews/0/extensions/EXT_meshopt_compression: its compressed bytes cannot be decoded"), std::string::npos);
-  EXPECT_NE(message([](Json& e) { e["byteLength"] = 4000; }).find("lie outside their buffer"), std::string::npos);
-  EXPECT_NE(message([](Json& e) { e["count"] = 2000000000; }).find("a count of 2000000000 cannot come from 67 bytes"), std::string::npos);
-  EXPECT_NE(message([](Json& e) { e["byteStride"] = 13; }).find("byteStride 13 does not fit"), std::string::npos);
-  EXPECT_NE(message([](Json& e) { e["filter"] = "COLOR"; }).find("filter 'COLOR' with byteStride 12 is not supported"), std::string::npos);
-  EXPECT_NE(message([](Json& e) { e["mode"] = "STRIPS"; }).find("bufferViews/0"), std::string::npos);
+  EXPECT_TRUE(mentions(message([](Json& e) { e["byteLength"] = 40; }), "test.glb: bufferViews/0/extensions/EXT_meshopt_compression: its compressed bytes cannot be decoded"));
+  EXPECT_TRUE(mentions(message([](Json& e) { e["byteLength"] = 4000; }), "lie outside their buffer"));
+  EXPECT_TRUE(mentions(message([](Json& e) { e["count"] = 2000000000; }), "a count of 2000000000 cannot come from 67 bytes"));
+  EXPECT_TRUE(mentions(message([](Json& e) { e["byteStride"] = 13; }), "byteStride 13 does not fit"));
+  EXPECT_TRUE(mentions(message([](Json& e) { e["filter"] = "COLOR"; }), "filter 'COLOR' with byteStride 12 is not supported"));
+  EXPECT_TRUE(mentions(message([](Json& e) { e["mode"] = "STRIPS"; }), "bufferViews/0"));
 }
 
 TEST(GltfDraco, PositionsUvsColoursAndWinding) {
@@ -70,13 +71,13 @@ TEST(GltfDraco, DamageAndWrongIdsAreErrors) {
   g.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["attributes"]["POSITION"] = 9;
   auto wrongId = g.load();
   ASSERT_FALSE(wrongId);
-  EXPECT_NE(wrongId.error().message.find("test.glb: meshes/0/primitives/0/extensions/KHR_draco_mesh_compression: has no Draco attribute 9 for POSITION"), std::string::npos);
+  EXPECT_TRUE(mentions(wrongId.error().message, "test.glb: meshes/0/primitives/0/extensions/KHR_draco_mesh_compression: has no Draco attribute 9 for POSITION"));
   g = dracoSquare();
   g.json["bufferViews"][0]["byteLength"] = 60;
   auto cut = g.load();
   ASSERT_FALSE(cut);
   EXPECT_EQ(cut.error().kind, ErrorKind::Input);
-  EXPECT_NE(cut.error().message.find("Draco data cannot be decoded"), std::string::npos);
+  EXPECT_TRUE(mentions(cut.error().message, "Draco data cannot be decoded"));
 }
 
 }  // namespace
