@@ -10,7 +10,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-
 Json toJson(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 
 Json describePage(std::size_t index, const BakedPage& page, std::size_t charts) {
@@ -83,9 +82,8 @@ Json describeCharts(const Atlas& atlas) {
 /// What a later bake needs to keep charts where they are (with the list of charts). Null without generated charts.
 Json describeLayout(const Atlas& atlas, const AtlasOptions& options) {
   if (!(atlas.chartDensity > 0)) return nullptr;
-  return {{"chartDensity", atlas.chartDensity},     {"scale", atlas.chartScale},
-          {"firstPage", atlas.sceneUvPages},        {"pageSize", options.pageSize},
-          {"padding", options.padding},             {"blockAlign", options.blockAlign},
+  return {{"chartDensity", atlas.chartDensity}, {"scale", atlas.chartScale},  {"firstPage", atlas.sceneUvPages},
+          {"pageSize", options.pageSize},       {"padding", options.padding}, {"blockAlign", options.blockAlign},
           {"maxStretch", options.maxStretch}};
 }
 
@@ -149,8 +147,8 @@ Json describeRun(const BakeStats& stats, const BakeRecord& record) {
 }  // namespace
 
 const std::vector<std::string>& chartColumns() {
-  static const std::vector<std::string> columns = {"page", "instance",     "primitive", "texelsPerMeter", "triangles",
-                                                   "key",  "quarterTurns", "x",         "y"};
+  static const std::vector<std::string> columns = {
+      "page", "instance", "primitive", "texelsPerMeter", "triangles", "key", "quarterTurns", "x", "y"};
   return columns;
 }
 

@@ -13,7 +13,7 @@ const char* nameOf(Projection projection);  // "raw", "flat", "fit"
 const char* nameOf(Integrator integrator);  // "gather", "path"
 const char* nameOf(RnmDecode decode);       // "squared", "linear", "linear-normalized"
 
-std::string describeBounces(int bounces);      // a number, or "all"
+std::string describeBounces(int bounces);  // a number, or "all"
 
 /// The decode that every bake is made for.
 inline constexpr RnmDecode kBakeDecode = RnmDecode::Squared;

@@ -3,8 +3,8 @@
 #include <charconv>
 #include <cmath>
 
-#include "baker/baked_scene.h"
 #include "baker/bake_json.h"
+#include "baker/baked_scene.h"
 
 namespace lumel {
 namespace {
@@ -96,7 +96,8 @@ Expected<std::shared_ptr<const RememberedLayout>> readEarlierLayout(const fs::pa
   const Json& rows = memberOf(charts, "rows");
   if (columns != Json(chartColumns()) || !rows.is_array()) return damaged("/charts is not what this version writes");
   for (std::size_t i = 0; i < rows.size(); ++i)
-    if (!readChart(rows[i], firstPage, *layout)) return damaged(("/charts/rows/" + std::to_string(i) + " is not a chart").c_str());
+    if (!readChart(rows[i], firstPage, *layout))
+      return damaged(("/charts/rows/" + std::to_string(i) + " is not a chart").c_str());
   return std::shared_ptr<const RememberedLayout>(std::move(layout));
 }
 

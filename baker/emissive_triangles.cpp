@@ -294,8 +294,8 @@ float EmissiveTriangles::pdf(const HitSurface& hit, const Vec3& origin) const {
   if (!(probability > 0.0f)) return 0.0f;
   const Emitter& emitter = triangles_[light];
   const Vec3 a = emitter.corner - origin;
-  const float angle = triangleSolidAngle(a, a + emitter.e1, a + emitter.e2,
-                                         volumeOf(a, emitter.ng, emitter.doubleArea, emitter.back));
+  const float angle =
+      triangleSolidAngle(a, a + emitter.e1, a + emitter.e2, volumeOf(a, emitter.ng, emitter.doubleArea, emitter.back));
   if (bySolidAngle(angle)) return probability / angle;
   const Vec3 toLight = hit.p - origin;
   const float distance2 = glm::dot(toLight, toLight);

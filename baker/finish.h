@@ -18,8 +18,9 @@ struct FinishOptions {
 /// First noise is taken out of the maps, if asked for (lightmap/denoise.h); invalid texels take no part.
 /// A covered texel whose rays mostly met the backs of surfaces (validity under one half: it lies inside a wall, under
 /// a pillar) takes the light of the nearest valid texels of its chart, where the chart has any; it would leak darkness
-/// into bilinear lookups beside it. Then every map grows by `rings`, so that a lookup at a chart's border does not mix in
-/// black. The aux images stay as they are: they still tell own values from others, and give the error before denoising.
+/// into bilinear lookups beside it. Then every map grows by `rings`, so that a lookup at a chart's border does not mix
+/// in black. The aux images stay as they are: they still tell own values from others, and give the error before
+/// denoising.
 void finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels,
                  const FinishOptions& options);
 

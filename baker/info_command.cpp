@@ -140,11 +140,13 @@ Command infoCommand() {
   command.options.number("texels-per-meter", a.estimate.texelsPerMeter, {0.0f, 1e6f},
                          "Density for the estimate; 0: the density that fills one page");
   command.options.integer("page-size", a.estimate.pageSize, {4, 16384}, "Texels on a side of a page, for the estimate");
-  command.options.flag("lint", a.lint, "Check the lightmap UVs that a bake would use: overlaps, flips, tiny charts, ...");
+  command.options.flag("lint", a.lint,
+                       "Check the lightmap UVs that a bake would use: overlaps, flips, tiny charts, ...");
   command.options.choice("uv", a.lintOptions.atlas.uvSource, {"auto", "scene", "generate"},
                          "Lightmap UVs to check: the scene's where valid, the scene's, or generated ones");
   command.options.integer("padding", a.lintOptions.atlas.padding, {0, 64}, "Texels between charts");
-  command.options.path("charts", a.lintOptions.pictures, "Write a picture of each page's charts (PNG) to this folder").placeholder = "DIR";
+  command.options.path("charts", a.lintOptions.pictures, "Write a picture of each page's charts (PNG) to this folder")
+      .placeholder = "DIR";
   command.options.flag("allow-outside-paths", a.allowOutsidePaths, "Let the scene name files outside its own folder");
   command.run = [arguments](CommandContext& context) -> Expected<void> {
     const auto json = describe(*arguments);

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "baker/light_tree.h"
 #include "baker/lanes.h"
+#include "baker/light_tree.h"
 #include "baker/materials.h"
 #include "baker/ray_scene.h"
 #include "baker/sample_lanes.h"
@@ -152,7 +152,7 @@ class EmissiveTriangles {
     float luminance = 0.0f;     // mean of what it sends out
     std::uint32_t part = 0;
     std::uint32_t triangle = 0;
-    float back = 0.0f;  // 1: it shines from behind too
+    float back = 0.0f;     // 1: it shines from behind too
     bool uniform = false;  // it sends out `radiance` everywhere
     Vec3 radiance{0};
   };

@@ -9,8 +9,8 @@ namespace lumel {
 struct BakeSize {
   double pageTexels = 0.0;
   double coveredTexels = 0.0;
-  double triangles = 0.0;     // of all instances
-  double encodedBytes = 0.0;  // of images, as they are in their files
+  double triangles = 0.0;      // of all instances
+  double encodedBytes = 0.0;   // of images, as they are in their files
   double decodedTexels = 0.0;  // of images that shade or emit
 };
 

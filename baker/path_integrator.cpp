@@ -160,12 +160,10 @@ void WaveTracer::addLight(int lane, const Vec3& dirTangent, const Vec3& radiance
 }
 
 void WaveTracer::lightTexels() {
-  result_.shadowRays += directLight(
-      transport_, lanes_, samples_, 0, options_.gatherMode,
-      kGatherDensity,
-      [&](int lane, const Vec3& wi, const Vec3& light) {
-        addLight(lane, paths_[static_cast<std::size_t>(lane)].frame.toLocal(wi), light);
-      });
+  result_.shadowRays += directLight(transport_, lanes_, samples_, 0, options_.gatherMode, kGatherDensity,
+                                    [&](int lane, const Vec3& wi, const Vec3& light) {
+                                      addLight(lane, paths_[static_cast<std::size_t>(lane)].frame.toLocal(wi), light);
+                                    });
 }
 
 void WaveTracer::followPaths() {
@@ -177,14 +175,13 @@ void WaveTracer::followPaths() {
     if (depth >= kRouletteAfter) endDarkPaths(depth);
     if (std::none_of(lanes_.active.begin(), lanes_.active.end(), [](bool active) { return active; })) break;
     const std::uint32_t pattern = static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver;
-    result_.shadowRays += directLight(
-        transport_, lanes_, samples_, pattern, options_.bounceMode,
-        kCosineDensity,
-        [&](int lane, const Vec3& wi, const Vec3& light) {
-          Path& path = paths_[static_cast<std::size_t>(lane)];
-          const float cosTheta = glm::dot(wi, lanes_.receivers[static_cast<std::size_t>(lane)].ns);
-          path.radiance += path.beta * light * (cosTheta * kInvPi);
-        });
+    result_.shadowRays += directLight(transport_, lanes_, samples_, pattern, options_.bounceMode, kCosineDensity,
+                                      [&](int lane, const Vec3& wi, const Vec3& light) {
+                                        Path& path = paths_[static_cast<std::size_t>(lane)];
+                                        const float cosTheta =
+                                            glm::dot(wi, lanes_.receivers[static_cast<std::size_t>(lane)].ns);
+                                        path.radiance += path.beta * light * (cosTheta * kInvPi);
+                                      });
     // The last ray of a path only looks for what shines by itself.
     if (depth + 1 == lastDepth_ && !transport_.raysSeeLight()) break;
     if (!scatter(depth)) break;

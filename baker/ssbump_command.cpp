@@ -192,8 +192,7 @@ Expected<void> checkUse(const SsbumpArguments& a, const OptionTable& options) {
              heights = !convert && !mesh, rays = mesh || (heights && a.method == BackEnd::Rays);
   const MapFiles& save = a.save;
   bool dds = false;
-  for (const fs::path* file :
-       {&a.output, &save.weights, &save.occlusion, &save.ambient, &save.normal, &save.recovered})
+  for (const fs::path* file : {&a.output, &save.weights, &save.occlusion, &save.ambient, &save.normal, &save.recovered})
     dds = dds || lowerCaseExtension(*file) == ".dds";
   struct Rule {
     bool holds;
@@ -221,8 +220,7 @@ Expected<void> checkUse(const SsbumpArguments& a, const OptionTable& options) {
   };
   for (const Rule& rule : rules)
     for (const char* name : rule.options)
-      if (!rule.holds && options.isGiven(name))
-        return usageError(std::string("--") + name + " goes with " + rule.with);
+      if (!rule.holds && options.isGiven(name)) return usageError(std::string("--") + name + " goes with " + rule.with);
   if ((a.tileWidth > 0) != (a.tileHeight > 0)) return usageError("--tile-width and --tile-height go together");
   return {};
 }

@@ -64,8 +64,12 @@ class SurfaceBuilder {
  private:
   Vec3 normal(std::uint32_t source) const { return normalMatrix_ * source_.normals[source]; }
 
-  std::uint32_t vertex(std::uint32_t source, const Vec3& position, Vec2 uv, std::uint32_t chart, bool back, const Vec3& geometric) {
-    const VertexKey key{source, chart, (static_cast<std::uint64_t>(std::bit_cast<std::uint32_t>(uv.x)) << 32) | std::bit_cast<std::uint32_t>(uv.y), back};
+  std::uint32_t vertex(std::uint32_t source, const Vec3& position, Vec2 uv, std::uint32_t chart, bool back,
+                       const Vec3& geometric) {
+    const VertexKey key{
+        source, chart,
+        (static_cast<std::uint64_t>(std::bit_cast<std::uint32_t>(uv.x)) << 32) | std::bit_cast<std::uint32_t>(uv.y),
+        back};
     const auto [place, isNew] = vertexOf_.try_emplace(key, static_cast<std::uint32_t>(surface_.positions.size()));
     if (isNew) {
       Vec3 n = normal(source) * (back ? -1.0f : 1.0f);

@@ -13,8 +13,8 @@ struct PlacedTriangle {
   int primitive = 0;
   std::uint32_t triangle = 0;  // of the primitive
   int page = 0;
-  std::uint32_t chart = 0;        // into Atlas::charts
-  std::array<Vec2, 3> uvs;        // page's 0..1, at the corners in the source's order
+  std::uint32_t chart = 0;  // into Atlas::charts
+  std::array<Vec2, 3> uvs;  // page's 0..1, at the corners in the source's order
 };
 
 /// The surfaces of one instance (a primitive and page each, in that order), with normals and bake frames.

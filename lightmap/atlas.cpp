@@ -19,7 +19,8 @@ namespace {
 std::string figures(const UvReport& r) {
   if (!r.present) return "has no TEXCOORD_1";
   char text[200];
-  std::snprintf(text, sizeof text, "%zu vertices outside 0..1, %.1f of %.1f texels covered twice, %zu triangles without area",
+  std::snprintf(text, sizeof text,
+                "%zu vertices outside 0..1, %.1f of %.1f texels covered twice, %zu triangles without area",
                 r.outOfRangeVertices, r.overlapTexels, r.coveredTexels, r.zeroAreaTriangles);
   return text;
 }
@@ -33,7 +34,8 @@ class AtlasBuilder {
     for (std::size_t i = 0; i < scene_.instances.size(); ++i) {
       const Instance& instance = scene_.instances[i];
       const auto& primitives = scene_.meshes[static_cast<std::size_t>(instance.mesh)].primitives;
-      if (std::any_of(primitives.begin(), primitives.end(), [&](const Primitive& p) { return receivesLight(scene_, instance, p); }))
+      if (std::any_of(primitives.begin(), primitives.end(),
+                      [&](const Primitive& p) { return receivesLight(scene_, instance, p); }))
         receivers_.push_back(static_cast<int>(i));
     }
     placed_.resize(scene_.instances.size());
@@ -60,8 +62,11 @@ class AtlasBuilder {
     }
     for (const UvReport& uv : report.sceneUvs) {
       if (!uv.valid && options_.uvSource == UvSource::Scene)
-        return inputError("'" + uv.mesh + "': lightmap UVs cannot be used: " + figures(uv) + "; use --uv auto or generate");
-      if (!uv.valid && options_.uvSource != UvSource::AsGiven) report.warnings.push_back("'" + uv.mesh + "': TEXCOORD_1 is not valid (" + figures(uv) + "): charts are generated");
+        return inputError("'" + uv.mesh + "': lightmap UVs cannot be used: " + figures(uv) +
+                          "; use --uv auto or generate");
+      if (!uv.valid && options_.uvSource != UvSource::AsGiven)
+        report.warnings.push_back("'" + uv.mesh + "': TEXCOORD_1 is not valid (" + figures(uv) +
+                                  "): charts are generated");
       if (uv.frameCrossingTexels > 0)
         report.warnings.push_back("'" + uv.mesh + "': " + std::to_string(uv.frameCrossingTexels) +
                                   " texels lie in charts that cross a break of the material's tangent frame");
@@ -128,7 +133,8 @@ class AtlasBuilder {
       report.generatedCharts += unwrapped.charts.size();
     }
     takePlaces(objects, *places, keys);
-    const bool hadSome = std::any_of(kept.charts.begin(), kept.charts.end(), [](const auto& c) { return c.has_value(); });
+    const bool hadSome =
+        std::any_of(kept.charts.begin(), kept.charts.end(), [](const auto& c) { return c.has_value(); });
     if (earlier && report.keptCharts == 0 && report.generatedCharts > 0)
       report.warnings.push_back(std::string("the earlier layout ") +
                                 (hadSome ? "has no room for what changed" : "holds no chart of this scene") +
@@ -145,8 +151,8 @@ class AtlasBuilder {
                           : earlier.padding != options_.padding       ? "padding"
                           : earlier.blockAlign != options_.blockAlign ? "block alignment"
                           : earlier.maxStretch != options_.maxStretch ? "stretch limit"
-                          : options_.texelsPerMeter > 0 &&
-                                  !isClose(earlier.chartDensity * earlier.scale, static_cast<double>(options_.texelsPerMeter))
+                          : options_.texelsPerMeter > 0 && !isClose(earlier.chartDensity * earlier.scale,
+                                                                    static_cast<double>(options_.texelsPerMeter))
                               ? "texel density"
                               : nullptr;
     if (!differs) return &earlier;
@@ -171,8 +177,9 @@ class AtlasBuilder {
         const ChartPlace& place = places.charts[shape++];
         const auto index = static_cast<std::uint32_t>(atlas.charts.size());
         const double snap = std::sqrt(place.scale.x * place.scale.y) / (use.scale * places.scale);
-        atlas.charts.push_back({-1, atlas.texelsPerMeter * instance.settings.texelDensityScale * static_cast<float>(snap), key,
-                                place.quarterTurns, place.x, place.y});
+        atlas.charts.push_back({-1,
+                                atlas.texelsPerMeter * instance.settings.texelDensityScale * static_cast<float>(snap),
+                                key, place.quarterTurns, place.x, place.y});
         if (place.kept) ++result_.report.keptCharts;
         const auto& page = places.pages[static_cast<std::size_t>(place.page)];
         const Vec2d size(page[0], page[1]);

@@ -35,12 +35,12 @@ struct AtlasOptions {
 
 /// What a scene-supplied TEXCOORD_1 was found to be. Valid means: present, finite, in 0..1, and no texel covered twice.
 struct UvReport {
-  std::string mesh;               // name of the instance or mesh
+  std::string mesh;  // name of the instance or mesh
   bool present = false;
   bool valid = false;
   std::size_t outOfRangeVertices = 0;
   std::size_t zeroAreaTriangles = 0;
-  double overlapTexels = 0.0;     // texel area covered more than once, in texels of the page
+  double overlapTexels = 0.0;  // texel area covered more than once, in texels of the page
   double coveredTexels = 0.0;
   std::size_t frameCrossingTexels = 0;  // texels in charts that cross a break of the material's tangent frame
 };
@@ -50,8 +50,8 @@ struct AtlasReport {
   std::vector<UvReport> sceneUvs;
   std::vector<std::string> warnings;
   std::size_t generatedCharts = 0;
-  std::size_t keptCharts = 0;   // of these: where they were in AtlasOptions::layout
-  double keptShare = 0.0;       // of the surface with generated charts
+  std::size_t keptCharts = 0;  // of these: where they were in AtlasOptions::layout
+  double keptShare = 0.0;      // of the surface with generated charts
   std::size_t nonManifoldEdges = 0;
   std::size_t degenerateTriangles = 0;  // without area: they are in no chart and get no texels
   double chartSeconds = 0.0;

@@ -23,7 +23,8 @@ struct FrameVertex {  // a vertex of one chart, with what its triangles say
   /// Whether both are copies of one point of the chart: a thousandth of a texel apart is rounding.
   bool meets(const FrameVertex& o) const {
     constexpr float kSamePlace = 1e-6f;
-    return chart == o.chart && position == o.position && std::abs(uv.x - o.uv.x) <= kSamePlace && std::abs(uv.y - o.uv.y) <= kSamePlace;
+    return chart == o.chart && position == o.position && std::abs(uv.x - o.uv.x) <= kSamePlace &&
+           std::abs(uv.y - o.uv.y) <= kSamePlace;
   }
 };
 
@@ -98,17 +99,17 @@ void setCommonTangent(std::span<const FrameVertex> copies, std::span<Surface> su
     normalSum += Vec3d(surfaces[copy.surface].normals[copy.vertex]);
   }
   const double normalLength = glm::length(normalSum);
-  const Vec3 n = normalLength > 1e-6 ? Vec3(normalSum / normalLength) : surfaces[copies[0].surface].normals[copies[0].vertex];
+  const Vec3 n =
+      normalLength > 1e-6 ? Vec3(normalSum / normalLength) : surfaces[copies[0].surface].normals[copies[0].vertex];
   const double length = glm::length(sum);
   const Vec3 t = frameFromTangent(n, Vec4(length > 0 ? Vec3(sum / length) : Vec3(0.0f), 1.0f)).t;
-  for (const FrameVertex& copy : copies) surfaces[copy.surface].tangents[copy.vertex] = Vec4(t, hand < 0 ? -1.0f : 1.0f);
+  for (const FrameVertex& copy : copies)
+    surfaces[copy.surface].tangents[copy.vertex] = Vec4(t, hand < 0 ? -1.0f : 1.0f);
 }
 
 }  // namespace
 
-bool hasMaterialFrame(const Primitive& primitive) {
-  return !primitive.tangents.empty();
-}
+bool hasMaterialFrame(const Primitive& primitive) { return !primitive.tangents.empty(); }
 
 void setBakeFrames(const Scene& scene, std::span<Surface> surfaces) {
   std::vector<FrameVertex> vertices;

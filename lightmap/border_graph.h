@@ -79,7 +79,8 @@ class BorderGraph {
   /// The borders of a region that are not gone.
   template <class Visit>
   void forEachOf(Index region, Visit visit) const {
-    for (Index border = lists_[region].first; border != kNone; border = links_[border].next[sideOf(links_[border], region)])
+    for (Index border = lists_[region].first; border != kNone;
+         border = links_[border].next[sideOf(links_[border], region)])
       if (isAlive(border)) visit(border);
   }
 
@@ -204,7 +205,9 @@ class BorderQueue {
   struct Candidate {
     float cost;
     std::uint32_t border;
-    bool operator<(const Candidate& other) const { return cost != other.cost ? cost > other.cost : border > other.border; }
+    bool operator<(const Candidate& other) const {
+      return cost != other.cost ? cost > other.cost : border > other.border;
+    }
   };
   std::priority_queue<Candidate> queue_;
 };

@@ -36,13 +36,13 @@ struct ChartPlace {
 };
 
 struct ChartPlaces {
-  std::vector<ChartPlace> charts;          // in the order of objects.uses and their layouts' charts
-  std::vector<std::array<int, 2>> pages;   // width, height
-  double scale = 1.0;                      // found: multiplies the density that objects were laid out for
+  std::vector<ChartPlace> charts;         // in the order of objects.uses and their layouts' charts
+  std::vector<std::array<int, 2>> pages;  // width, height
+  double scale = 1.0;                     // found: multiplies the density that objects were laid out for
 };
 
-/// Where charts were in an earlier bake, and its scale. If all must fit one page and do not with every kept chart in its
-/// place, only the largest keep theirs; if that fails too, all are placed anew.
+/// Where charts were in an earlier bake, and its scale. If all must fit one page and do not with every kept chart in
+/// its place, only the largest keep theirs; if that fails too, all are placed anew.
 struct KeptLayout {
   double scale = 1.0;
   std::vector<std::optional<KeptPlace>> charts;  // in the order of ChartPlaces::charts

@@ -17,8 +17,8 @@ namespace lumel {
 namespace {
 
 constexpr double kDensityTolerance = 0.25;
-constexpr double kFarTexels = 4.0;           // a slit of less blurs a detail that a lightmap does not hold
-constexpr double kFloatUvStep = 6e-8;        // of the page's side
+constexpr double kFarTexels = 4.0;              // a slit of less blurs a detail that a lightmap does not hold
+constexpr double kFloatUvStep = 6e-8;           // of the page's side
 constexpr double kBytesPerTexel = 4 * 3 * 2.0;  // four maps of three half floats
 
 struct ChartFigures {
@@ -100,7 +100,8 @@ class Linter {
         if (uv.x >= 0 && uv.x <= 1 && uv.y >= 0 && uv.y <= 1) continue;
         ++outside.count;
         const double off = std::max({-uv.x, uv.x - 1, -uv.y, uv.y - 1});
-        setWorst(outside, std::isfinite(off) ? off : 1e9, static_cast<int>(s), Vec2d(uv) * Vec2d(page.width, page.height));
+        setWorst(outside, std::isfinite(off) ? off : 1e9, static_cast<int>(s),
+                 Vec2d(uv) * Vec2d(page.width, page.height));
       }
       for (std::size_t t = 0; t < surface.triangleCount(); ++t) {
         const Corners p = texelCorners(atlas_, surface, t);
@@ -184,12 +185,14 @@ class Linter {
   void findNearCharts(const Page& page, const std::vector<std::uint32_t>& owner) {
     for (int y = 0; y < page.height; ++y)
       for (int x = 0; x < page.width; ++x) {
-        const std::uint32_t id = owner[static_cast<std::size_t>(y) * static_cast<std::size_t>(page.width) + static_cast<std::size_t>(x)];
+        const std::uint32_t id =
+            owner[static_cast<std::size_t>(y) * static_cast<std::size_t>(page.width) + static_cast<std::size_t>(x)];
         if (id == 0) continue;
         for (int dy = 0; dy <= padding_ && y + dy < page.height; ++dy)
           for (int dx = dy == 0 ? 1 : -padding_; dx <= padding_; ++dx) {
             if (x + dx < 0 || x + dx >= page.width) continue;
-            const std::uint32_t other = owner[static_cast<std::size_t>(y + dy) * static_cast<std::size_t>(page.width) + static_cast<std::size_t>(x + dx)];
+            const std::uint32_t other = owner[static_cast<std::size_t>(y + dy) * static_cast<std::size_t>(page.width) +
+                                              static_cast<std::size_t>(x + dx)];
             if (other != 0 && other != id) charts_[id - 1].near = charts_[other - 1].near = true;
           }
       }
@@ -209,14 +212,15 @@ class Linter {
     std::sort(vertices.begin(), vertices.end());
     std::vector<std::uint32_t> numbers(vertices.size(), 0);
     for (std::size_t i = 1; i < vertices.size(); ++i)
-      numbers[vertices[i].second] = numbers[vertices[i - 1].second] + (vertices[i].first != vertices[i - 1].first ? 1 : 0);
+      numbers[vertices[i].second] =
+          numbers[vertices[i - 1].second] + (vertices[i].first != vertices[i - 1].first ? 1 : 0);
     return numbers;
   }
 
   /// Of edges that a chart runs across: small turns may add up around a point without any edge that breaks.
   void findFrameCrossings() {
     struct Side {
-      std::uint32_t low, high;              // points
+      std::uint32_t low, high;                      // points
       std::uint32_t chart, surface, atLow, atHigh;  // vertices of the surface
     };
     const std::vector<std::uint32_t> numbers = pointNumbers();
@@ -269,7 +273,8 @@ class Linter {
       for (std::size_t i = 0; i < page.size(); ++i) {
         if (!(apart[i] > kFarTexels)) continue;
         ++mixed.count;
-        setWorst(mixed, apart[i], static_cast<int>(page.trianglesOf(i)[0].surface), Vec2d(page.coords[i].x, page.coords[i].y));
+        setWorst(mixed, apart[i], static_cast<int>(page.trianglesOf(i)[0].surface),
+                 Vec2d(page.coords[i].x, page.coords[i].y));
       }
     }
     report_.findings.push_back(mixed);
@@ -286,21 +291,21 @@ class Linter {
       if (chartOf(source.triangle) != chart) continue;
       const std::vector<Vec3>& p = atlas_.surfaces[source.triangle.surface].positions;
       const Vec2d w = Vec2d(piece.barycentric[0] + piece.barycentric[1] + piece.barycentric[2]) / 3.0;
-      const Vec3d middle = (1 - w.x - w.y) * Vec3d(p[source.vertices[0]]) + w.x * Vec3d(p[source.vertices[1]]) + w.y * Vec3d(p[source.vertices[2]]);
+      const Vec3d middle = (1 - w.x - w.y) * Vec3d(p[source.vertices[0]]) + w.x * Vec3d(p[source.vertices[1]]) +
+                           w.y * Vec3d(p[source.vertices[2]]);
       low = glm::min(low, middle);
       high = glm::max(high, middle);
     }
     const ChartFigures& figures = charts_[chart];
-    return low.x <= high.x && figures.surface > 0 ? glm::length(high - low) * std::sqrt(figures.texels / figures.surface) : 0.0;
+    return low.x <= high.x && figures.surface > 0
+               ? glm::length(high - low) * std::sqrt(figures.texels / figures.surface)
+               : 0.0;
   }
 
   template <class Test, class Value>
   void addCharts(const char* id, const char* meaning, LintLevel level, Test test, Value value) {
-    LintFinding finding{.id = id,
-                        .meaning = meaning,
-                        .level = level,
-                        .total = static_cast<double>(charts_.size()),
-                        .unit = "charts"};
+    LintFinding finding{
+        .id = id, .meaning = meaning, .level = level, .total = static_cast<double>(charts_.size()), .unit = "charts"};
     for (const ChartFigures& chart : charts_) {
       if (chart.surfaceIndex < 0 || !test(chart)) continue;
       ++finding.count;
@@ -327,23 +332,32 @@ class Linter {
     }
     report_.findings.insert(report_.findings.begin(), overlap);
     const auto texelsOf = [](const ChartFigures& c) { return c.texels; };
-    addCharts("mirrored", "charts mirrored on the page (their frame is left-handed)", LintLevel::Note,
-              [](const ChartFigures& c) { return c.signedTexels < 0; }, texelsOf);
-    addCharts("sub-texel", "charts with less area than one texel", LintLevel::Note, [](const ChartFigures& c) { return c.texels < 1; },
-              [](const ChartFigures& c) { return -c.texels; });
-    addCharts("tiny", "charts with less area than four texels", LintLevel::Note, [](const ChartFigures& c) { return c.texels < 4; },
-              [](const ChartFigures& c) { return -c.texels; });
+    addCharts(
+        "mirrored", "charts mirrored on the page (their frame is left-handed)", LintLevel::Note,
+        [](const ChartFigures& c) { return c.signedTexels < 0; }, texelsOf);
+    addCharts(
+        "sub-texel", "charts with less area than one texel", LintLevel::Note,
+        [](const ChartFigures& c) { return c.texels < 1; }, [](const ChartFigures& c) { return -c.texels; });
+    addCharts(
+        "tiny", "charts with less area than four texels", LintLevel::Note,
+        [](const ChartFigures& c) { return c.texels < 4; }, [](const ChartFigures& c) { return -c.texels; });
     const double mean = surface > 0 ? std::sqrt(texels / surface) : 0.0;
     const auto offMean = [this, mean](const ChartFigures& c) {
       const int instance = atlas_.surfaces[static_cast<std::size_t>(c.surfaceIndex)].instance;
       const double scale = scene_.instances[static_cast<std::size_t>(instance)].settings.texelDensityScale;
-      return c.surface > 0 && c.texels > 0 && mean > 0 ? std::abs(std::log(std::sqrt(c.texels / c.surface) / (mean * scale))) : 0.0;
+      return c.surface > 0 && c.texels > 0 && mean > 0
+                 ? std::abs(std::log(std::sqrt(c.texels / c.surface) / (mean * scale)))
+                 : 0.0;
     };
-    addCharts("density", "charts whose texel density is a quarter or more off the mean", LintLevel::Warning,
-              [&offMean](const ChartFigures& c) { return offMean(c) > std::log(1 + kDensityTolerance); }, offMean);
-    addCharts("frame-crossing", "charts across which the tangent frame of the bake breaks", LintLevel::Warning,
-              [](const ChartFigures& c) { return c.crossesFrame; }, texelsOf);
-    addCharts("gap", "charts nearer to another than the padding", LintLevel::Warning, [](const ChartFigures& c) { return c.near; }, texelsOf);
+    addCharts(
+        "density", "charts whose texel density is a quarter or more off the mean", LintLevel::Warning,
+        [&offMean](const ChartFigures& c) { return offMean(c) > std::log(1 + kDensityTolerance); }, offMean);
+    addCharts(
+        "frame-crossing", "charts across which the tangent frame of the bake breaks", LintLevel::Warning,
+        [](const ChartFigures& c) { return c.crossesFrame; }, texelsOf);
+    addCharts(
+        "gap", "charts nearer to another than the padding", LintLevel::Warning,
+        [](const ChartFigures& c) { return c.near; }, texelsOf);
   }
 
   const Scene& scene_;
@@ -359,18 +373,23 @@ const char* nameOf(LintLevel level) {
   return level == LintLevel::Error ? "error" : level == LintLevel::Warning ? "warning" : "note";
 }
 
-LintReport lintAtlas(const Scene& scene, const Atlas& atlas, int padding) { return Linter(scene, atlas, padding).run(); }
+LintReport lintAtlas(const Scene& scene, const Atlas& atlas, int padding) {
+  return Linter(scene, atlas, padding).run();
+}
 
 std::vector<std::string> lintText(const LintReport& report) {
   std::vector<std::string> lines;
   char text[400];
   for (const LintFinding& f : report.findings) {
     if (!(f.count > 0)) continue;
-    std::snprintf(text, sizeof text, "%s: %s: %.6g of %.6g %s: %s; worst: ", nameOf(f.level), f.id.c_str(), f.count, f.total, f.unit.c_str(), f.meaning.c_str());
-    lines.push_back(text + f.worst + " (page " + std::to_string(f.page) + ", texel " + std::to_string(f.x) + " " + std::to_string(f.y) + ")");
+    std::snprintf(text, sizeof text, "%s: %s: %.6g of %.6g %s: %s; worst: ", nameOf(f.level), f.id.c_str(), f.count,
+                  f.total, f.unit.c_str(), f.meaning.c_str());
+    lines.push_back(text + f.worst + " (page " + std::to_string(f.page) + ", texel " + std::to_string(f.x) + " " +
+                    std::to_string(f.y) + ")");
   }
-  std::snprintf(text, sizeof text, "%zu charts on %zu pages, %.0f of %.0f texels covered (%.1f %%), %.1f MB of half-float maps", report.charts,
-                report.pages, report.coveredTexels, report.pageTexels,
+  std::snprintf(text, sizeof text,
+                "%zu charts on %zu pages, %.0f of %.0f texels covered (%.1f %%), %.1f MB of half-float maps",
+                report.charts, report.pages, report.coveredTexels, report.pageTexels,
                 report.pageTexels > 0 ? 100 * report.coveredTexels / report.pageTexels : 0.0, report.mapBytes / 1e6);
   lines.push_back(text);
   return lines;

@@ -22,8 +22,8 @@ struct Dissection {
   std::vector<DissectionNode> nodes;  // children before parents, ranges ascending and without gaps
 };
 
-/// Halves first, the points that part them last, each half likewise. Halves are cut at the median along the longest side
-/// of their box, so the parting line of a surface of n points has about sqrt(n) and a factor n log n entries.
+/// Halves first, the points that part them last, each half likewise. Halves are cut at the median along the longest
+/// side of their box, so the parting line of a surface of n points has about sqrt(n) and a factor n log n entries.
 Dissection nestedDissection(std::span<const Vec3d> points, std::span<const std::array<std::uint32_t, 3>> triangles);
 
 }  // namespace lumel

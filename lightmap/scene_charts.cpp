@@ -53,7 +53,8 @@ bool sameFrame(const Vec4& a, const Vec4& b) {
 
 }  // namespace
 
-std::vector<PlacedTriangle> placeSceneUvs(const Scene& scene, int instanceIndex, int page, int pageSize, Atlas& atlas, UvReport& report) {
+std::vector<PlacedTriangle> placeSceneUvs(const Scene& scene, int instanceIndex, int page, int pageSize, Atlas& atlas,
+                                          UvReport& report) {
   const Instance& instance = scene.instances[static_cast<std::size_t>(instanceIndex)];
   const Mesh& mesh = scene.meshes[static_cast<std::size_t>(instance.mesh)];
   Vertices all = gather(mesh);
@@ -106,7 +107,8 @@ std::vector<PlacedTriangle> placeSceneUvs(const Scene& scene, int instanceIndex,
     chart.texels += triangleArea(Vec2d(triangle.uvs[0]), triangle.uvs[1], triangle.uvs[2]) * pageSize * pageSize;
   }
   for (const ChartFigures& chart : figures) {
-    atlas.charts.push_back({-1, chart.surface > 0 ? static_cast<float>(std::sqrt(chart.texels / chart.surface)) : 0.0f});
+    atlas.charts.push_back(
+        {-1, chart.surface > 0 ? static_cast<float>(std::sqrt(chart.texels / chart.surface)) : 0.0f});
     if (chart.crossesFrame) report.frameCrossingTexels += static_cast<std::size_t>(std::ceil(chart.texels));
   }
   return placed;

@@ -6,8 +6,9 @@
 
 namespace lumel {
 
-/// The instance's triangles at their TEXCOORD_1 on `page`, and its charts (triangles that share points and UVs) appended
-/// to atlas.charts. Counts texels of charts that cross a break of the material's frame in `report`.
-std::vector<PlacedTriangle> placeSceneUvs(const Scene& scene, int instance, int page, int pageSize, Atlas& atlas, UvReport& report);
+/// The instance's triangles at their TEXCOORD_1 on `page`, and its charts (triangles that share points and UVs)
+/// appended to atlas.charts. Counts texels of charts that cross a break of the material's frame in `report`.
+std::vector<PlacedTriangle> placeSceneUvs(const Scene& scene, int instance, int page, int pageSize, Atlas& atlas,
+                                          UvReport& report);
 
 }  // namespace lumel

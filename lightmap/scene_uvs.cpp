@@ -9,10 +9,10 @@ namespace lumel {
 namespace {
 
 constexpr std::size_t kUvSet = 1;
-constexpr float kRangeTolerance = 1e-5f;       // of the page: rounding of normalised 16-bit UVs
+constexpr float kRangeTolerance = 1e-5f;  // of the page: rounding of normalised 16-bit UVs
 constexpr double kOverlapShare = 0.001;
 constexpr double kOverlapTexels = 16.0;
-constexpr double kLostSurfaceShare = 0.01;     // surface that the UVs leave without area
+constexpr double kLostSurfaceShare = 0.01;  // surface that the UVs leave without area
 
 struct Examination {
   UvReport report;
@@ -37,7 +37,8 @@ Examination examine(const Scene& scene, const Instance& instance, int pageSize) 
     }
     const std::vector<Vec2>& uvs = primitive.uvSets[kUvSet];
     for (const Vec2& uv : uvs)
-      if (!(uv.x >= -kRangeTolerance && uv.x <= 1 + kRangeTolerance && uv.y >= -kRangeTolerance && uv.y <= 1 + kRangeTolerance))
+      if (!(uv.x >= -kRangeTolerance && uv.x <= 1 + kRangeTolerance && uv.y >= -kRangeTolerance &&
+            uv.y <= 1 + kRangeTolerance))
         ++report.outOfRangeVertices;  // NaN too
     for (std::size_t t = 0; t < primitive.triangleCount(); ++t) {
       std::array<Vec2d, 3> uv;
@@ -61,8 +62,10 @@ Examination examine(const Scene& scene, const Instance& instance, int pageSize) 
   UvPoints points(pageSize, pageSize);
   for (const std::array<Vec2d, 3>& uv : result.triangles)
     points.forEach(uv, [&](std::size_t i) {
-      if (points.test(i)) report.overlapTexels += UvPoints::kTexelsPerPoint;
-      else report.coveredTexels += UvPoints::kTexelsPerPoint;
+      if (points.test(i))
+        report.overlapTexels += UvPoints::kTexelsPerPoint;
+      else
+        report.coveredTexels += UvPoints::kTexelsPerPoint;
       points.set(i);
     });
   report.valid = !result.triangles.empty() && lost <= kLostSurfaceShare * surface &&
@@ -94,7 +97,8 @@ SceneUvs examineSceneUvs(const Scene& scene, const std::vector<int>& receivers, 
       if (examined.report.valid || (examined.report.present && options.uvSource == UvSource::AsGiven)) {
         use.used = true;
         for (;; ++use.page) {
-          if (static_cast<std::size_t>(use.page) == pages.size()) pages.emplace_back(options.pageSize, options.pageSize);
+          if (static_cast<std::size_t>(use.page) == pages.size())
+            pages.emplace_back(options.pageSize, options.pageSize);
           UvPoints& page = pages[static_cast<std::size_t>(use.page)];
           double taken = 0;
           for (const auto& uv : examined.triangles)

@@ -16,8 +16,8 @@ struct SceneUvUse {
 };
 
 struct SceneUvs {
-  std::vector<SceneUvUse> uses;     // in the order of `receivers`
-  std::vector<UvReport> reports;    // of those whose meshes have a TEXCOORD_1 at all; all of them under UvSource::Scene
+  std::vector<SceneUvUse> uses;   // in the order of `receivers`
+  std::vector<UvReport> reports;  // of those whose meshes have a TEXCOORD_1 at all; all of them under UvSource::Scene
   int pageCount = 0;
 };
 

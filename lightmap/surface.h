@@ -55,7 +55,7 @@ struct Atlas {
   float texelsPerMeter = 0.0f;  // nominal density, as given or as found to fill the page; 0 with scene UVs alone
   double chartDensity = 0.0;    // that generated charts were made for, before they were scaled to it by chartScale
   double chartScale = 1.0;
-  int sceneUvPages = 0;         // the first pages hold the scene's own lightmap UVs
+  int sceneUvPages = 0;  // the first pages hold the scene's own lightmap UVs
 };
 
 }  // namespace lumel

@@ -16,9 +16,9 @@ struct UnwrapOptions {
 
 /// A flattened chart. Orientation is kept: what is counter-clockwise on the front is so here, with y up.
 struct UnwrappedChart {
-  std::vector<std::uint32_t> triangles;                // of the soup
-  std::vector<std::array<std::uint32_t, 3>> corners;   // per triangle: into uvs
-  std::vector<Vec2> uvs;                               // texels, y up, uniform density
+  std::vector<std::uint32_t> triangles;               // of the soup
+  std::vector<std::array<std::uint32_t, 3>> corners;  // per triangle: into uvs
+  std::vector<Vec2> uvs;                              // texels, y up, uniform density
 };
 
 struct Unwrapped {

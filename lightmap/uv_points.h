@@ -59,7 +59,8 @@ class UvPoints {
       }
       if (!(left < right)) continue;
       const double last = std::min<double>(width, std::ceil(right));
-      for (int x = static_cast<int>(std::clamp(std::ceil(left), 0.0, static_cast<double>(width))); x < last; ++x) visit(x, y);
+      for (int x = static_cast<int>(std::clamp(std::ceil(left), 0.0, static_cast<double>(width))); x < last; ++x)
+        visit(x, y);
     }
   }
 

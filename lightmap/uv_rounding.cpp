@@ -8,9 +8,9 @@
 namespace lumel {
 namespace {
 
-constexpr double kStep = 1.0 / (1 << 24);    // of the page: what a float in [0.5, 1) can tell apart
-constexpr double kFarthestTexels = 1e-3;     // that a corner is moved: less than any lookup can tell
-constexpr int kPasses = 8;                   // a fan of slivers straightens one triangle at a time
+constexpr double kStep = 1.0 / (1 << 24);  // of the page: what a float in [0.5, 1) can tell apart
+constexpr double kFarthestTexels = 1e-3;   // that a corner is moved: less than any lookup can tell
+constexpr int kPasses = 8;                 // a fan of slivers straightens one triangle at a time
 
 /// Twice the area in texels of a triangle with UVs on a page (v down), positive where it is counter-clockwise as seen;
 /// less that of a triangle a quarter of a step high, which is none at all.
@@ -22,9 +22,11 @@ double sureArea(std::span<const Vec2> uvs, const std::array<std::uint32_t, 3>& t
 }
 
 struct Lost {
-  int triangles = 0;    // without area or turned over
-  double depth = 0;     // how much area they lack, in sum
-  bool operator<(const Lost& other) const { return triangles != other.triangles ? triangles < other.triangles : depth < other.depth; }
+  int triangles = 0;  // without area or turned over
+  double depth = 0;   // how much area they lack, in sum
+  bool operator<(const Lost& other) const {
+    return triangles != other.triangles ? triangles < other.triangles : depth < other.depth;
+  }
 };
 
 class Nudger {
@@ -107,7 +109,8 @@ class Nudger {
 
 }  // namespace
 
-void keepAreasAfterRounding(std::span<Vec2> uvs, std::span<const std::array<std::uint32_t, 3>> triangles, Vec2d pageSize) {
+void keepAreasAfterRounding(std::span<Vec2> uvs, std::span<const std::array<std::uint32_t, 3>> triangles,
+                            Vec2d pageSize) {
   std::vector<std::uint32_t> lost;
   for (std::uint32_t t = 0; t < triangles.size(); ++t)
     if (!(sureArea(uvs, triangles[t], pageSize) > 0)) lost.push_back(t);

@@ -13,6 +13,7 @@ namespace lumel {
 /// area or turned over: their corners are moved by steps of that size until every triangle of the chart has area
 /// and is counter-clockwise as seen, as far as places can be found within a thousandth of a texel.
 /// `uvs`: 0..1 of a page of `pageSize` texels, v down; `triangles`: into `uvs`.
-void keepAreasAfterRounding(std::span<Vec2> uvs, std::span<const std::array<std::uint32_t, 3>> triangles, Vec2d pageSize);
+void keepAreasAfterRounding(std::span<Vec2> uvs, std::span<const std::array<std::uint32_t, 3>> triangles,
+                            Vec2d pageSize);
 
 }  // namespace lumel

@@ -11,7 +11,8 @@ Expected<Environment> loadEnvironment(const std::filesystem::path& file) {
   auto loaded = readImage(file);
   if (!loaded) return loaded.error();
   if (!loaded->isFloat)
-    return inputError(file.string() + ": holds integers (" + loaded->format + "), not radiance; use an .hdr or .exr file");
+    return inputError(file.string() + ": holds integers (" + loaded->format +
+                      "), not radiance; use an .hdr or .exr file");
   const Image& in = loaded->image;
   Environment environment;
   environment.image = Image(in.width, in.height, 3);
@@ -22,7 +23,8 @@ Expected<Environment> loadEnvironment(const std::filesystem::path& file) {
       for (int c = 0; c < 3; ++c)
         if (!std::isfinite(radiance[c]) || radiance[c] < 0)
           return inputError(file.string() + ": pixel (" + std::to_string(x) + ", " + std::to_string(y) + ") is " +
-                            std::to_string(radiance[c]) + "; radiance must be finite and not negative: repair the image");
+                            std::to_string(radiance[c]) +
+                            "; radiance must be finite and not negative: repair the image");
       environment.image.setRgb(x, y, radiance);
     }
   return environment;

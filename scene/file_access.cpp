@@ -52,7 +52,8 @@ bool isInside(const fs::path& file, const fs::path& folder) {
 }  // namespace
 
 std::string lowerCase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return text;
 }
 
@@ -90,7 +91,8 @@ Expected<std::vector<std::uint8_t>> decodeDataUri(std::string_view uri) {
   int pending = 0;
   for (std::size_t i = 0; i < text.size() && text[i] != '='; ++i) {
     const auto value = kTable[static_cast<unsigned char>(text[i])];
-    if (value < 0) return inputError("is a data URI with a character that is not base64 at position " + std::to_string(i));
+    if (value < 0)
+      return inputError("is a data URI with a character that is not base64 at position " + std::to_string(i));
     bits = (bits << 6 | static_cast<std::uint32_t>(value)) & 0xFFFFFFu;
     pending += 6;
     if (pending >= 8) {
@@ -129,8 +131,7 @@ Expected<fs::path> resolveReference(const fs::path& folder, const std::string& r
   const fs::path file = fs::weakly_canonical(base / reference, ec);
   if (ec) return inputError("'" + reference + "' cannot be resolved: " + ec.message());
   if (!options.allowOutsidePaths && (fs::path(reference).is_absolute() || !isInside(file, base)))
-    return inputError("'" + reference +
-                      "' leaves the scene's folder; move the file there, or allow paths outside it");
+    return inputError("'" + reference + "' leaves the scene's folder; move the file there, or allow paths outside it");
   return file;
 }
 

@@ -76,7 +76,8 @@ Expected<void> writeBytes(const PendingFile& file, std::string_view bytes);
 /// The pieces one after the other.
 Expected<void> writeBytes(const PendingFile& file, std::span<const std::vector<std::uint8_t>> pieces);
 
-/// Refuses an output that would overwrite one of its own inputs. Empty paths are ignored. Errors: Usage, naming the file.
+/// Refuses an output that would overwrite one of its own inputs. Empty paths are ignored. Errors: Usage, naming the
+/// file.
 Expected<void> checkNoInput(const std::filesystem::path& place, std::span<const std::filesystem::path> inputs);
 
 /// Finds out before the long work whether `dir` can be written: makes it and a file in it, and removes what it made.

@@ -103,8 +103,9 @@ Expected<ElementLayout> layoutOf(const GltfDocument& document, int index, int co
   const auto& view = document.model.bufferViews[static_cast<std::size_t>(accessor.bufferView)];
   if (view.byteStride != 0) layout.stride = view.byteStride;
   if (layout.stride < layout.elementSize)
-    return document.error(placeOf(index), "byteStride " + std::to_string(layout.stride) + " is less than an element's " +
-                                              std::to_string(layout.elementSize) + " bytes");
+    return document.error(placeOf(index), "byteStride " + std::to_string(layout.stride) +
+                                              " is less than an element's " + std::to_string(layout.elementSize) +
+                                              " bytes");
   auto bytes = elements(document, placeOf(index), accessor.bufferView, accessor.byteOffset, accessor.count,
                         layout.stride, layout.elementSize);
   if (!bytes) return bytes.error();
@@ -128,9 +129,9 @@ Expected<void> applySparse(const GltfDocument& document, int index, const Elemen
   auto indices = elements(document, place + "/indices", sparse.indices.bufferView,
                           static_cast<std::size_t>(sparse.indices.byteOffset), count, indexSize, indexSize);
   if (!indices) return indices.error();
-  auto values = elements(document, place + "/values", sparse.values.bufferView,
-                         static_cast<std::size_t>(sparse.values.byteOffset), count, layout.elementSize,
-                         layout.elementSize);
+  auto values =
+      elements(document, place + "/values", sparse.values.bufferView,
+               static_cast<std::size_t>(sparse.values.byteOffset), count, layout.elementSize, layout.elementSize);
   if (!values) return values.error();
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t element = componentToInteger(indices->data() + i * indexSize, type);

@@ -24,10 +24,17 @@ using Json = nlohmann::json;
 constexpr int kMaxJsonDepth = 128;
 
 constexpr std::array<std::string_view, 11> kHandledExtensions = {
-    "KHR_lights_punctual",        "KHR_materials_emissive_strength",     "KHR_texture_transform",
-    "KHR_mesh_quantization",      "KHR_materials_unlit",                 "EXT_texture_webp",
-    "EXT_meshopt_compression",    "KHR_meshopt_compression",             "KHR_draco_mesh_compression",
-    "EXT_mesh_gpu_instancing",    "KHR_materials_pbrSpecularGlossiness",  // its diffuse part, all a lightmap needs
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_texture_transform",
+    "KHR_mesh_quantization",
+    "KHR_materials_unlit",
+    "EXT_texture_webp",
+    "EXT_meshopt_compression",
+    "KHR_meshopt_compression",
+    "KHR_draco_mesh_compression",
+    "EXT_mesh_gpu_instancing",
+    "KHR_materials_pbrSpecularGlossiness",  // its diffuse part, all a lightmap needs
 };
 
 struct Chunks {
@@ -76,8 +83,10 @@ bool nestsTooDeep(std::string_view json) {
   for (std::size_t i = 0; i < json.size(); ++i) {
     const char c = json[i];
     if (inString) {
-      if (c == '\\') ++i;
-      else if (c == '"') inString = false;
+      if (c == '\\')
+        ++i;
+      else if (c == '"')
+        inString = false;
     } else if (c == '"') {
       inString = true;
     } else if (c == '{' || c == '[') {
@@ -128,8 +137,7 @@ std::optional<Error> checkRequiredExtensions(const Json& root, const std::string
     if (!extension.is_string()) continue;
     const auto& text = extension.get_ref<const std::string&>();
     if (std::find(kHandledExtensions.begin(), kHandledExtensions.end(), text) == kHandledExtensions.end())
-      return inputError(name + ": extensionsRequired: '" + text +
-                        "' is not supported; export without it");
+      return inputError(name + ": extensionsRequired: '" + text + "' is not supported; export without it");
   }
   return std::nullopt;
 }
@@ -197,7 +205,7 @@ Expected<std::span<const std::uint8_t>> GltfDocument::viewBytes(int view) const 
   if (!decodedViews[index].empty()) return std::span<const std::uint8_t>(decodedViews[index]);
   const auto& v = model.bufferViews[index];
   const GltfBuffer& buffer = buffers[static_cast<std::size_t>(v.buffer)];
-  if (!buffer.present) 
+  if (!buffer.present)
     return error(place, "buffers/" + std::to_string(v.buffer) +
                             " has neither a uri nor a GLB chunk; export or copy the file again");
   if (v.byteOffset > buffer.bytes.size() || v.byteLength > buffer.bytes.size() - v.byteOffset)
@@ -236,8 +244,8 @@ Expected<GltfDocument> openGltf(std::vector<std::uint8_t> bytes, const std::stri
     }
   if (root->contains("images"))
     for (const Json& json : (*root)["images"])
-      document.images.push_back({json.value("name", ""), json.value("uri", ""), json.value("mimeType", ""),
-                                 json.value("bufferView", -1)});
+      document.images.push_back(
+          {json.value("name", ""), json.value("uri", ""), json.value("mimeType", ""), json.value("bufferView", -1)});
   auto model = readModel(*std::move(root), name);
   if (!model) return model.error();
   document.model = *std::move(model);

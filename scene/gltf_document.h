@@ -35,8 +35,8 @@ struct GltfImage {
 
 /// All indices inside `model` are valid (checkGltfSchema); its own buffers and images are empty.
 struct GltfDocument {
-  std::string name;               // the file, for messages
-  std::filesystem::path folder;   // that relative references start from
+  std::string name;              // the file, for messages
+  std::filesystem::path folder;  // that relative references start from
   LoadOptions options;
   tinygltf::Model model;
   std::vector<std::uint8_t> container;  // the file's bytes; a GLB's BIN chunk is read in place

@@ -46,10 +46,11 @@ Expected<DracoAttribute> readAttribute(const draco::Mesh& mesh, int id, const st
   result.values.resize(static_cast<std::size_t>(result.components) * mesh.num_points());
   for (draco::PointIndex point(0); point < mesh.num_points(); ++point) {
     const draco::AttributeValueIndex value = attribute->mapped_index(point);
-    const bool inRange = value.value() < attribute->size() &&
-                         static_cast<std::int64_t>(value.value() + 1) * attribute->byte_stride() <=
-                             static_cast<std::int64_t>(attribute->buffer()->data_size());
-    if (!inRange || !readAny(*attribute, value, &result.values[point.value() * static_cast<std::size_t>(result.components)]))
+    const bool inRange =
+        value.value() < attribute->size() && static_cast<std::int64_t>(value.value() + 1) * attribute->byte_stride() <=
+                                                 static_cast<std::int64_t>(attribute->buffer()->data_size());
+    if (!inRange ||
+        !readAny(*attribute, value, &result.values[point.value() * static_cast<std::size_t>(result.components)]))
       return inputError("Draco attribute " + name + " cannot be read");
   }
   return result;

@@ -18,7 +18,7 @@ struct DracoAttribute {
 
 struct DracoMesh {
   std::size_t vertexCount = 0;
-  std::vector<std::uint32_t> indices;           // three per triangle, each below vertexCount
+  std::vector<std::uint32_t> indices;  // three per triangle, each below vertexCount
   std::map<std::string, DracoAttribute> attributes;
 };
 

@@ -50,8 +50,8 @@ class MaterialLoader {
 
   const GltfDocument& document_;
   Scene& scene_;
-  std::vector<int> imageSlots_;       // per image of the file: index in scene.images, or -1
-  std::vector<std::size_t> wanted_;   // images of the file in scene order
+  std::vector<int> imageSlots_;      // per image of the file: index in scene.images, or -1
+  std::vector<std::size_t> wanted_;  // images of the file in scene order
 };
 
 int MaterialLoader::image(int fileImage) {
@@ -116,11 +116,13 @@ Material MaterialLoader::convert(const tinygltf::Material& source) {
     material.emission *= toFloat(valueNumber(*strength, "emissiveStrength", 1.0));
   if (const auto* specular = findExtension(source.extensions, "KHR_materials_pbrSpecularGlossiness")) {
     if (specular->Has("diffuseFactor"))
-      for (int c = 0; c < 4; ++c) material.baseColor[c] = toFloat(specular->Get("diffuseFactor").Get(c).GetNumberAsDouble());
+      for (int c = 0; c < 4; ++c)
+        material.baseColor[c] = toFloat(specular->Get("diffuseFactor").Get(c).GetNumberAsDouble());
     if (specular->Has("diffuseTexture")) {
       const auto& info = specular->Get("diffuseTexture");
       const auto& extensions = info.Has("extensions") ? info.Get("extensions") : info;
-      const auto* transform = extensions.Has("KHR_texture_transform") ? &extensions.Get("KHR_texture_transform") : nullptr;
+      const auto* transform =
+          extensions.Has("KHR_texture_transform") ? &extensions.Get("KHR_texture_transform") : nullptr;
       material.baseColorMap = texture(static_cast<int>(valueNumber(info, "index", -1)),
                                       static_cast<int>(valueNumber(info, "texCoord", 0)), transform);
     }
@@ -132,8 +134,8 @@ Expected<ImageSource> MaterialLoader::load(const GltfImage& image, std::size_t i
   const std::string place = "images/" + std::to_string(index);
   ImageSource source;
   source.name = !image.uri.empty() && !isDataUri(image.uri) ? percentDecode(image.uri)
-                : image.name.empty()                         ? "image " + std::to_string(index)
-                                                             : image.name;
+                : image.name.empty()                        ? "image " + std::to_string(index)
+                                                            : image.name;
   const auto missing = [&](const std::string& why) {
     scene_.report.warnings.push_back(document_.name + ": " + place + ": " + why +
                                      "; the material's factor applies alone");

@@ -41,15 +41,17 @@ std::vector<std::uint32_t> triangulate(const std::vector<std::uint32_t>& in, int
   return out;
 }
 
-std::optional<Error> checkPositions(const GltfDocument& document, const std::string& place, const Primitive& primitive) {
+std::optional<Error> checkPositions(const GltfDocument& document, const std::string& place,
+                                    const Primitive& primitive) {
   for (std::size_t v = 0; v < primitive.positions.size(); ++v) {
     const Vec3& p = primitive.positions[v];
     if (!isFinite(p))
-      return document.error(place + "/attributes/POSITION", "vertex " + std::to_string(v) +
-                                                                " is not finite; repair the mesh and export again");
-    if (std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kMaxCoordinate)
       return document.error(place + "/attributes/POSITION",
-                            "vertex " + std::to_string(v) + " is more than 1e18 m away; repair the mesh and export again");
+                            "vertex " + std::to_string(v) + " is not finite; repair the mesh and export again");
+    if (std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kMaxCoordinate)
+      return document.error(
+          place + "/attributes/POSITION",
+          "vertex " + std::to_string(v) + " is more than 1e18 m away; repair the mesh and export again");
   }
   return std::nullopt;
 }
@@ -73,7 +75,8 @@ std::optional<Error> load(const GltfDocument& document, const MeshUse& use, cons
   if (use.vertexTransform)
     for (std::size_t v = 0; v < primitive.positions.size(); ++v) transformVertex(primitive, v, *use.vertexTransform);
   // Draco hands over a triangle list whatever the mode.
-  const bool isList = source.mode == TINYGLTF_MODE_TRIANGLES || findExtension(source.extensions, "KHR_draco_mesh_compression");
+  const bool isList =
+      source.mode == TINYGLTF_MODE_TRIANGLES || findExtension(source.extensions, "KHR_draco_mesh_compression");
   primitive.indices = triangulate(*indices, isList ? TINYGLTF_MODE_TRIANGLES : source.mode);
   if (isList && indices->size() % 3 != 0)
     job.report.warnings.push_back(primitive.name + ": " + std::to_string(indices->size()) +

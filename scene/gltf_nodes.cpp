@@ -194,7 +194,9 @@ std::optional<Error> NodeFlattener::addMesh(std::size_t index) {
     return document_.error("meshes/" + std::to_string(node.mesh) + "/extras/lumel", *problem);
   if (auto problem = readObjectSettings(node.extras, settings))
     return document_.error(placeOf(index) + "/extras/lumel", *problem);
-  const std::string name = !node.name.empty() ? node.name : !mesh.name.empty() ? mesh.name : "node " + std::to_string(index);
+  const std::string name = !node.name.empty()   ? node.name
+                           : !mesh.name.empty() ? mesh.name
+                                                : "node " + std::to_string(index);
 
   if (node.skin >= 0) {
     auto joints = jointMatrices(document_, node.skin, worldFromNode_);
@@ -212,7 +214,8 @@ std::optional<Error> NodeFlattener::addMesh(std::size_t index) {
     return document_.error(placeOf(index), "the scene has more than " + std::to_string(kMaxInstances) + " instances");
   const bool many = findExtension(node.extensions, "EXT_mesh_gpu_instancing") != nullptr;
   for (std::size_t i = 0; i < transforms->size(); ++i)
-    addInstance(node.mesh, many ? name + "[" + std::to_string(i) + "]" : name, (*transforms)[i], settings, node.weights);
+    addInstance(node.mesh, many ? name + "[" + std::to_string(i) + "]" : name, (*transforms)[i], settings,
+                node.weights);
   return std::nullopt;
 }
 
@@ -224,7 +227,8 @@ void NodeFlattener::addLight(std::size_t node, int index) {
                : source.type == "directional" ? LightType::Directional
                                               : LightType::Point;
   if (source.color.size() == 3)
-    for (int c = 0; c < 3; ++c) light.color[c] = static_cast<float>(std::max(source.color[static_cast<std::size_t>(c)], 0.0));
+    for (int c = 0; c < 3; ++c)
+      light.color[c] = static_cast<float>(std::max(source.color[static_cast<std::size_t>(c)], 0.0));
   light.intensity = static_cast<float>(std::max(source.intensity, 0.0));
   light.range = static_cast<float>(std::max(source.range, 0.0));
   const double outer = std::clamp(source.spot.outerConeAngle, 0.0, static_cast<double>(kPi) / 2);
@@ -245,14 +249,15 @@ void NodeFlattener::addCamera(std::size_t node) {
   const glm::dmat4& world = worldFromNode_[node];
   const glm::dvec3 x(world[0]), z(world[2]);
   if (!isInvertible(world)) {
-    scene_.report.warnings.push_back(document_.name + ": " + placeOf(node) + ": the camera's transform has no inverse; left out");
+    scene_.report.warnings.push_back(document_.name + ": " + placeOf(node) +
+                                     ": the camera's transform has no inverse; left out");
     return;
   }
   const glm::dvec3 back = glm::normalize(z);
   const glm::dvec3 right = glm::normalize(x - back * glm::dot(x, back));
   const double side = glm::determinant(glm::dmat3(world)) < 0 ? -1.0 : 1.0;
-  camera.worldFromCamera = Mat4(glm::dmat4(glm::dvec4(right, 0), glm::dvec4(side * glm::cross(back, right), 0),
-                                           glm::dvec4(back, 0), world[3]));
+  camera.worldFromCamera = Mat4(
+      glm::dmat4(glm::dvec4(right, 0), glm::dvec4(side * glm::cross(back, right), 0), glm::dvec4(back, 0), world[3]));
   camera.orthographic = source.type == "orthographic";
   if (camera.orthographic) {
     camera.yExtent = static_cast<float>(source.orthographic.ymag);

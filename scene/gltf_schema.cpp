@@ -118,7 +118,8 @@ void Checker::value(const Json& value, const Field& field) {
       }
       return;
     case Type::Size:
-      if (!value.is_number_unsigned() || value.get<std::uint64_t>() > std::uint64_t{std::numeric_limits<std::int64_t>::max()})
+      if (!value.is_number_unsigned() ||
+          value.get<std::uint64_t>() > std::uint64_t{std::numeric_limits<std::int64_t>::max()})
         fail("must be a whole number, not negative");
       return;
     case Type::Int:
@@ -267,9 +268,8 @@ void Checker::attributeMap(const Json& object, const char* key, bool required) {
 }
 
 void Checker::primitive(const Json& primitive) {
-  static constexpr Field kFields[] = {{"indices", Type::Index, "accessors"},
-                                      {"material", Type::Index, "materials"},
-                                      {"mode", Type::Int}};
+  static constexpr Field kFields[] = {
+      {"indices", Type::Index, "accessors"}, {"material", Type::Index, "materials"}, {"mode", Type::Int}};
   if (!fields(primitive, kFields)) return;
   if (primitive.value("mode", std::uint64_t{4}) > 6) return fail("mode must be 0 to 6");
   attributeMap(primitive, "attributes", true);
@@ -394,9 +394,8 @@ void Checker::light(const Json& light) {
 }
 
 std::optional<std::string> Checker::run() {
-  static constexpr Field kRoot[] = {{"extensionsUsed", Type::Strings},
-                                    {"extensionsRequired", Type::Strings},
-                                    {"scene", Type::Index, "scenes"}};
+  static constexpr Field kRoot[] = {
+      {"extensionsUsed", Type::Strings}, {"extensionsRequired", Type::Strings}, {"scene", Type::Index, "scenes"}};
   static constexpr Field kBuffer[] = {{"uri", Type::String}, {"byteLength", Type::Size, nullptr, 0, true}};
   static constexpr Field kImage[] = {
       {"uri", Type::String}, {"mimeType", Type::String}, {"bufferView", Type::Index, "bufferViews"}};
@@ -408,9 +407,8 @@ std::optional<std::string> Checker::run() {
   static constexpr Field kSkin[] = {{"joints", Type::Indices, "nodes", 0, true},
                                     {"inverseBindMatrices", Type::Index, "accessors"}};
 
-  extension(root_, "KHR_lights_punctual", [&](const Json& lights) {
-    forEach(lights, "lights", [&](const Json& item) { light(item); });
-  });
+  extension(root_, "KHR_lights_punctual",
+            [&](const Json& lights) { forEach(lights, "lights", [&](const Json& item) { light(item); }); });
   forEach(root_, "buffers", [&](const Json& item) { fields(item, kBuffer); });
   forEach(root_, "bufferViews", [&](const Json& item) { bufferView(item); });
   forEach(root_, "accessors", [&](const Json& item) { accessor(item); });

@@ -12,9 +12,9 @@ Expected<std::vector<Mat4>> jointMatrices(const GltfDocument& document, int skin
     auto read = readArray<Mat4>(document, source.inverseBindMatrices);
     if (!read) return read.error();
     if (read->size() < source.joints.size())
-      return document.error("skins/" + std::to_string(skin) + "/inverseBindMatrices",
-                            "has " + std::to_string(read->size()) + " matrices for " +
-                                std::to_string(source.joints.size()) + " joints");
+      return document.error(
+          "skins/" + std::to_string(skin) + "/inverseBindMatrices",
+          "has " + std::to_string(read->size()) + " matrices for " + std::to_string(source.joints.size()) + " joints");
     inverseBind = *std::move(read);
   }
   std::vector<Mat4> matrices;

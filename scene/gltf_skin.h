@@ -11,7 +11,8 @@
 namespace lumel {
 
 /// World from bind pose for each joint of the skin. worldFromNode has one entry per node.
-Expected<std::vector<Mat4>> jointMatrices(const GltfDocument& document, int skin, std::span<const glm::dmat4> worldFromNode);
+Expected<std::vector<Mat4>> jointMatrices(const GltfDocument& document, int skin,
+                                          std::span<const glm::dmat4> worldFromNode);
 
 /// Applies a matrix to one vertex: position, tangent, and the normal by the cofactor matrix, which exists for any
 /// matrix and is the inverse transpose up to scale.

@@ -26,8 +26,9 @@ struct Image {
 
   bool empty() const { return pixels.empty(); }
   float* at(int x, int y) {
-    return pixels.data() + (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)) *
-                               static_cast<std::size_t>(channels);
+    return pixels.data() +
+           (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)) *
+               static_cast<std::size_t>(channels);
   }
   const float* at(int x, int y) const { return const_cast<Image*>(this)->at(x, y); }
   Vec3 rgb(int x, int y) const {

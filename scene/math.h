@@ -71,7 +71,8 @@ struct Frame {
   Vec3 fromLocal(const Vec3& v) const { return v.x * t + v.y * b + v.z * n; }
 };
 
-/// An arbitrary right-handed frame about the unit vector n (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+/// An arbitrary right-handed frame about the unit vector n (Duff et al. 2017, "Building an Orthonormal Basis,
+/// Revisited").
 inline Frame frameAround(const Vec3& n) {
   const float sign = std::copysign(1.0f, n.z);
   const float a = -1.0f / (sign + n.z);

@@ -40,9 +40,7 @@ void forEachLine(std::string_view text, const Body& body) {
 }
 
 /// 0, 1, 2 for "v", "vt", "vn"; -1 for other statements.
-int kindOf(std::string_view keyword) {
-  return keyword == "v" ? 0 : keyword == "vt" ? 1 : keyword == "vn" ? 2 : -1;
-}
+int kindOf(std::string_view keyword) { return keyword == "v" ? 0 : keyword == "vt" ? 1 : keyword == "vn" ? 2 : -1; }
 
 std::optional<std::string> checkNumbers(std::string_view line, int kind) {
   const int needed = kind == 1 ? 1 : 3;

@@ -13,7 +13,8 @@ namespace {
 
 class ObjMaterialLoader {
  public:
-  ObjMaterialLoader(const std::string& name, const std::filesystem::path& folder, const LoadOptions& options, Scene& scene)
+  ObjMaterialLoader(const std::string& name, const std::filesystem::path& folder, const LoadOptions& options,
+                    Scene& scene)
       : name_(name), folder_(folder), options_(options), scene_(scene) {}
 
   std::optional<Error> add(const ObjMaterial& source);
@@ -38,7 +39,8 @@ Expected<int> ObjMaterialLoader::image(const std::string& file) {
   if (const auto it = images_.find(file); it != images_.end()) return it->second;
   // A path with a drive letter is another machine's; the file may lie beside the scene.
   const bool foreign = file.size() > 2 && file[1] == ':';
-  const std::string reference = foreign ? file.substr(file.rfind('/') == std::string::npos ? 2 : file.rfind('/') + 1) : file;
+  const std::string reference =
+      foreign ? file.substr(file.rfind('/') == std::string::npos ? 2 : file.rfind('/') + 1) : file;
   auto path = resolveReference(folder_, reference, options_);
   if (!path) return inputError(name_ + ": MTL: " + path.error().message);
   ImageSource source;
@@ -67,8 +69,8 @@ Expected<TextureRef> ObjMaterialLoader::reference(const ObjMap& map) {
   auto index = image(map.file);
   if (!index) return index.error();
   ref.image = *index;
-  ref.uvMatrix = Mat3(Vec3(map.scale.x, 0, 0), Vec3(0, map.scale.y, 0),
-                      Vec3(map.offset.x, 1 - map.scale.y - map.offset.y, 1));
+  ref.uvMatrix =
+      Mat3(Vec3(map.scale.x, 0, 0), Vec3(0, map.scale.y, 0), Vec3(map.offset.x, 1 - map.scale.y - map.offset.y, 1));
   if (map.clamp) ref.wrapU = ref.wrapV = Wrap::Clamp;
   return ref;
 }
@@ -112,8 +114,10 @@ std::optional<Error> ObjMaterialLoader::addAlpha(const ObjMaterial& source, Mate
         const bool grey = color->image.channels < 3;
         for (int c = 0; c < 3; ++c) out[c] = color->image.at(x, y)[grey ? 0 : c];
       }
-      out[3] = opacity(*alpha, static_cast<int>((x + 0.5f) * static_cast<float>(alpha->image.width) / static_cast<float>(size.width)),
-                       static_cast<int>((y + 0.5f) * static_cast<float>(alpha->image.height) / static_cast<float>(size.height)));
+      out[3] = opacity(
+          *alpha,
+          static_cast<int>((x + 0.5f) * static_cast<float>(alpha->image.width) / static_cast<float>(size.width)),
+          static_cast<int>((y + 0.5f) * static_cast<float>(alpha->image.height) / static_cast<float>(size.height)));
     }
   auto png = encodePng(combined);
   if (!png) return png.error();

@@ -39,8 +39,8 @@ class MtlReader : public tinyobj::MaterialReader {
   MtlReader(const std::string& name, const std::filesystem::path& folder, const LoadOptions& options)
       : name_(name), folder_(folder), options_(options) {}
 
-  bool operator()(const std::string& file, std::vector<tinyobj::material_t>* materials,
-                  std::map<std::string, int>* ids, std::string* warning, std::string* error) override {
+  bool operator()(const std::string& file, std::vector<tinyobj::material_t>* materials, std::map<std::string, int>* ids,
+                  std::string* warning, std::string* error) override {
     auto path = resolveReference(folder_, forwardSlashes(file), options_);
     if (!path) {
       refusal = inputError(name_ + ": mtllib: " + path.error().message);
@@ -144,7 +144,8 @@ Expected<ObjFile> parse(std::string_view text, const std::string& name, const st
   std::vector<tinyobj::material_t> materials;
   std::string warning, error;
   MtlReader reader(name, folder, options);
-  const bool loaded = tinyobj::LoadObj(&attributes, &shapes, &materials, &warning, &error, &stream, &reader, false, false);
+  const bool loaded =
+      tinyobj::LoadObj(&attributes, &shapes, &materials, &warning, &error, &stream, &reader, false, false);
   if (reader.refusal) return *reader.refusal;
   if (!loaded) {
     std::replace(error.begin(), error.end(), '\n', ' ');

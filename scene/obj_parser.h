@@ -22,8 +22,8 @@ struct ObjCorner {
 
 struct ObjFace {
   std::size_t firstCorner = 0;
-  std::size_t corners = 0;  // 3 or more
-  int material = -1;        // into ObjFile::materials; -1: none
+  std::size_t corners = 0;      // 3 or more
+  int material = -1;            // into ObjFile::materials; -1: none
   unsigned smoothingGroup = 0;  // 0: off
 };
 

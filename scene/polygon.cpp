@@ -15,7 +15,8 @@ bool contains(const Vec2d& a, const Vec2d& b, const Vec2d& c, const Vec2d& p) {
 Triangles cutQuad(const std::vector<Vec2d>& p, std::span<const Vec3> corners) {
   const double smaller02 = std::min(signedArea(p[0], p[1], p[2]), signedArea(p[0], p[2], p[3]));
   const double smaller13 = std::min(signedArea(p[0], p[1], p[3]), signedArea(p[1], p[2], p[3]));
-  const bool shorter02 = glm::distance(Vec3d(corners[0]), Vec3d(corners[2])) <= glm::distance(Vec3d(corners[1]), Vec3d(corners[3]));
+  const bool shorter02 =
+      glm::distance(Vec3d(corners[0]), Vec3d(corners[2])) <= glm::distance(Vec3d(corners[1]), Vec3d(corners[3]));
   const bool use02 = smaller02 > 0 && smaller13 > 0 ? shorter02 : smaller02 >= smaller13;
   if (use02) return {{0, 1, 2}, {0, 2, 3}};
   return {{0, 1, 3}, {1, 2, 3}};

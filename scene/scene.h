@@ -21,14 +21,14 @@ inline constexpr float kMaxCoordinate = 1e18f;
 struct Primitive {
   std::string name;  // for messages: "mesh 'Wall' primitive 2"
   std::vector<Vec3> positions;
-  std::vector<Vec3> normals;                // unit; always present after loading (flat where the file had none)
-  std::vector<Vec4> tangents;               // xyz unit, w = +-1: bitangent = w * cross(n, t); from the file or made
-                                            // from the normal map's UVs; empty where neither asks for them
-  std::vector<std::vector<Vec2>> uvSets;    // TEXCOORD_n; v runs down the image
-  std::vector<Vec4> colors;                 // COLOR_0, linear, alpha 1 where the file has RGB
-  std::vector<std::uint32_t> indices;       // three per triangle, counter-clockwise from the front
-  int material = 0;                         // into Scene::materials; always valid
-  int lightmapPage = -1;                    // extras.lumel.page of the primitive: its lightmap, on TEXCOORD_1; -1 = none
+  std::vector<Vec3> normals;              // unit; always present after loading (flat where the file had none)
+  std::vector<Vec4> tangents;             // xyz unit, w = +-1: bitangent = w * cross(n, t); from the file or made
+                                          // from the normal map's UVs; empty where neither asks for them
+  std::vector<std::vector<Vec2>> uvSets;  // TEXCOORD_n; v runs down the image
+  std::vector<Vec4> colors;               // COLOR_0, linear, alpha 1 where the file has RGB
+  std::vector<std::uint32_t> indices;     // three per triangle, counter-clockwise from the front
+  int material = 0;                       // into Scene::materials; always valid
+  int lightmapPage = -1;                  // extras.lumel.page of the primitive: its lightmap, on TEXCOORD_1; -1 = none
 
   std::size_t triangleCount() const { return indices.size() / 3; }
 };
@@ -79,7 +79,7 @@ struct Material {
   float metallic = 0.0f;
   float roughness = 1.0f;
   TextureRef metallicRoughnessMap;
-  TextureRef normalMap;        // tangent space, green up
+  TextureRef normalMap;  // tangent space, green up
   float normalScale = 1.0f;
   Vec3 emission{0, 0, 0};  // nits: emissiveFactor * emissiveStrength
   TextureRef emissionMap;  // sRGB, times `emission`
@@ -129,7 +129,7 @@ struct Camera {
 /// direction d reads u = 0.5 + atan2(d.z, d.x) / 2pi, v (from the top) = 0.5 - asin(d.y) / pi.
 struct Environment {
   Vec3 color{0, 0, 0};
-  Image image;  // linear RGB; empty: `color` everywhere
+  Image image;                   // linear RGB; empty: `color` everywhere
   float rotationDegrees = 0.0f;  // turns the sky about +y, counter-clockwise seen from above
   float strength = 1.0f;
 
@@ -138,9 +138,9 @@ struct Environment {
 
 /// What loading met that the user may want to know.
 struct LoadReport {
-  std::vector<std::string> warnings;  // one line each
-  std::size_t degenerateTriangles = 0;   // dropped: zero area or repeated vertices
-  std::size_t skippedPrimitives = 0;     // points and lines
+  std::vector<std::string> warnings;    // one line each
+  std::size_t degenerateTriangles = 0;  // dropped: zero area or repeated vertices
+  std::size_t skippedPrimitives = 0;    // points and lines
 };
 
 /// What a surface without a material is made of: grey, since white without end would drown a closed level in light.

@@ -39,12 +39,12 @@ struct VertexKeyHash {
 
 /// What the UV mapping says of one triangle: its tangent direction and its winding in the image.
 struct Triangle {
-  std::array<std::uint32_t, 3> v{};                             // welded vertices
-  std::array<std::int32_t, 3> neighbour{kNone, kNone, kNone};   // across the edge from corner k to k + 1
-  std::array<std::int32_t, 3> group{kNone, kNone, kNone};       // per corner
-  Vec3 tangent{0};  // along growing u; unit, or zero
-  bool sameWinding = false;  // the triangle's front shows the image unmirrored
-  bool flexible = true;      // no usable tangent of its own: may join any group
+  std::array<std::uint32_t, 3> v{};                            // welded vertices
+  std::array<std::int32_t, 3> neighbour{kNone, kNone, kNone};  // across the edge from corner k to k + 1
+  std::array<std::int32_t, 3> group{kNone, kNone, kNone};      // per corner
+  Vec3 tangent{0};                                             // along growing u; unit, or zero
+  bool sameWinding = false;                                    // the triangle's front shows the image unmirrored
+  bool flexible = true;                                        // no usable tangent of its own: may join any group
 };
 
 struct Group {
@@ -140,9 +140,10 @@ void TangentBuilder::connect() {
   const auto link = [&](const Edge& e) -> std::int32_t& { return triangles_[e.triangle].neighbour[e.corner]; };
   for (std::size_t i = 0; i < edges.size(); ++i) {
     if (link(edges[i]) != kNone) continue;
-    for (std::size_t j = i + 1; j < edges.size() && edges[j].low == edges[i].low && edges[j].high == edges[i].high; ++j) {
-      const bool opposite = triangles_[edges[i].triangle].v[edges[i].corner] !=
-                            triangles_[edges[j].triangle].v[edges[j].corner];
+    for (std::size_t j = i + 1; j < edges.size() && edges[j].low == edges[i].low && edges[j].high == edges[i].high;
+         ++j) {
+      const bool opposite =
+          triangles_[edges[i].triangle].v[edges[i].corner] != triangles_[edges[j].triangle].v[edges[j].corner];
       if (!opposite || link(edges[j]) != kNone) continue;
       link(edges[i]) = static_cast<std::int32_t>(edges[j].triangle);
       link(edges[j]) = static_cast<std::int32_t>(edges[i].triangle);
@@ -160,7 +161,8 @@ void TangentBuilder::grow(std::size_t t, std::size_t k) {
   while (!pending.empty()) {
     Triangle& triangle = triangles_[pending.back()];
     pending.pop_back();
-    const auto corner = static_cast<std::size_t>(std::find(triangle.v.begin(), triangle.v.end(), vertex) - triangle.v.begin());
+    const auto corner =
+        static_cast<std::size_t>(std::find(triangle.v.begin(), triangle.v.end(), vertex) - triangle.v.begin());
     if (corner == 3 || triangle.group[corner] != kNone) continue;
     // A triangle without a direction of its own takes the winding of the first group that reaches it.
     if (triangle.flexible && triangle.group == std::array<std::int32_t, 3>{kNone, kNone, kNone})

@@ -30,8 +30,9 @@ struct ConvertSettings {
 Expected<void> convertMap(const std::filesystem::path& input, const std::filesystem::path& output,
                           const ConvertSettings& settings, const Progress& progress = noProgress());
 
-/// A second map for work in `encoding` (detail, cross-fade): three channels and more, brought over from the form that the
-/// file's metadata name, or from `form` where they name none; normal maps become weights. Errors: Input, Interrupted.
+/// A second map for work in `encoding` (detail, cross-fade): three channels and more, brought over from the form that
+/// the file's metadata name, or from `form` where they name none; normal maps become weights. Errors: Input,
+/// Interrupted.
 Expected<Image> readMapAs(const std::filesystem::path& file, const MapForm& form, const Encoding& encoding,
                           const Progress& progress);
 

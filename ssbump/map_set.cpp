@@ -200,10 +200,8 @@ Expected<void> MapSet::write(const Image& normals, const Image& occlusion, const
          return perTexel(basisSize_,
                          [&](int x, int y, float* out) { std::copy_n(occlusion.at(x, y), basisSize_, out); });
        }},
-      {ambient_,
-       [&] { return perTexel(1, [&](int x, int y, float* out) { *out = occlusion.at(x, y)[basisSize_]; }); }},
-      {normal_,
-       [&] { return perTexel(3, [&](int x, int y, float* out) { setNormal(normals.rgb(x, y), out); }); }},
+      {ambient_, [&] { return perTexel(1, [&](int x, int y, float* out) { *out = occlusion.at(x, y)[basisSize_]; }); }},
+      {normal_, [&] { return perTexel(3, [&](int x, int y, float* out) { setNormal(normals.rgb(x, y), out); }); }},
       {recovered_, [&] { return perTexel(3, recovered); }}};
   for (const Output& output : outputs)
     if (output.writer)

@@ -29,9 +29,9 @@ struct MapOptions {
 class MapWriter {
  public:
   /// The files join `files`, which puts them in place.
-  static Expected<MapWriter> open(FileSet& files, const std::filesystem::path& file, int width, int height, int channels, MapKind kind,
-                                  const MapOptions& options, std::vector<std::string> channelNames,
-                                  std::map<std::string, std::string> metadata);
+  static Expected<MapWriter> open(FileSet& files, const std::filesystem::path& file, int width, int height,
+                                  int channels, MapKind kind, const MapOptions& options,
+                                  std::vector<std::string> channelNames, std::map<std::string, std::string> metadata);
 
   /// The next rows from the top. Memory: a plain map holds no rows; with mips a quarter of the map (box filter, even
   /// sides) or all of it; DDS all of it.

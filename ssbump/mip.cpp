@@ -50,9 +50,7 @@ std::vector<Taps> makeTaps(int in, int out, MipFilter filter) {
   return all;
 }
 
-int edge(int i, int size, bool wrap) {
-  return wrap ? wrapIndex(i, size) : std::clamp(i, 0, size - 1);
-}
+int edge(int i, int size, bool wrap) { return wrap ? wrapIndex(i, size) : std::clamp(i, 0, size - 1); }
 
 }  // namespace
 

@@ -111,7 +111,7 @@ class Packet {
 }  // namespace
 
 Expected<RayOcclusion> RayOcclusion::build(const HeightField& field, const RaySettings& settings,
-                                             const Progress& progress) {
+                                           const Progress& progress) {
   RayOcclusion self(field, settings);
   if (self.settings_.reach <= 0) self.settings_.reach = automaticReach(field);
   auto device = newEmbreeDevice();
@@ -163,8 +163,8 @@ Image RayOcclusion::occlusion(const TexelRect& rect, std::span<const Lobe> lobes
   return out;
 }
 
-std::vector<float> RayOcclusion::occlusionAt(std::span<const std::pair<int, int>> texels,
-                                             std::span<const Lobe> lobes, Progress& progress) const {
+std::vector<float> RayOcclusion::occlusionAt(std::span<const std::pair<int, int>> texels, std::span<const Lobe> lobes,
+                                             Progress& progress) const {
   const HemisphereSamples samples(settings_.sampling, settings_.count, settings_.seed);
   const std::size_t channels = lobes.size();
   std::vector<float> out(texels.size() * channels);

@@ -250,7 +250,8 @@ std::vector<MipRow> studyMips(const Image& map, int lastMip, const Progress& pro
     }
   }
   for (MipRow& row : rows)
-    row.lightRmse = std::sqrt(row.lightRmse / (texels(static_cast<std::size_t>(row.mip)) * static_cast<double>(directions.size())));
+    row.lightRmse =
+        std::sqrt(row.lightRmse / (texels(static_cast<std::size_t>(row.mip)) * static_cast<double>(directions.size())));
   return rows;
 }
 

@@ -66,8 +66,7 @@ struct Fixture {
   Scene roundTrip() const {
     const std::string glb = encoded();
     const fs::path dir = scratch();
-    std::ofstream(dir / "scene.glb", std::ios::binary)
-        .write(glb.data(), static_cast<std::streamsize>(glb.size()));
+    std::ofstream(dir / "scene.glb", std::ios::binary).write(glb.data(), static_cast<std::streamsize>(glb.size()));
     auto loaded = loadScene(dir / "scene.glb");
     EXPECT_TRUE(loaded) << (loaded ? "" : loaded.error().message);
     return loaded ? std::move(*loaded) : Scene();
@@ -215,8 +214,8 @@ TEST(GlbWriter, ContainerFollowsTheSpecification) {
   const std::size_t jsonSize = word(12);
   EXPECT_EQ(jsonSize % 4, 0u);
   EXPECT_EQ(word(16), 0x4E4F534Au);
-  const auto json = nlohmann::json::parse(glb.begin() + 20, glb.begin() + 20 + static_cast<std::ptrdiff_t>(jsonSize),
-                                          nullptr, false);
+  const auto json =
+      nlohmann::json::parse(glb.begin() + 20, glb.begin() + 20 + static_cast<std::ptrdiff_t>(jsonSize), nullptr, false);
   ASSERT_FALSE(json.is_discarded());
   EXPECT_EQ(word(20 + jsonSize) % 4, 0u);
   for (const auto& view : json["bufferViews"]) EXPECT_EQ(view["byteOffset"].get<int>() % 4, 0);

@@ -251,7 +251,8 @@ TEST(SphericalTriangle, AngleAbove) {
   for (int i = 0; i <= 1000; ++i) {
     const double angle = std::numbers::pi * i / 1000.0;
     const auto y = static_cast<float>(std::abs(std::sin(angle))), x = static_cast<float>(std::cos(angle));
-    EXPECT_NEAR(static_cast<double>(angleAbove(y, x)), std::atan2(static_cast<double>(y), static_cast<double>(x)), 5e-7);
+    EXPECT_NEAR(static_cast<double>(angleAbove(y, x)), std::atan2(static_cast<double>(y), static_cast<double>(x)),
+                5e-7);
   }
 }
 

@@ -2,7 +2,6 @@
 // closed rooms, and the figures that it reports.
 #include <gtest/gtest.h>
 
-
 #include "tests/baker/test_scene.h"
 #include "tests/mentions.h"
 

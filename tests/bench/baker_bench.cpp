@@ -188,9 +188,8 @@ void BM_DirectLight(benchmark::State& state) {
       samples.setTexel(lane, TexelSampler(1, 0, static_cast<std::uint32_t>(wave), static_cast<std::uint32_t>(lane)));
     }
     ++wave;
-    rays += directLight(
-        transport, lanes, samples, 0, TraceMode::Packet, kGatherDensity,
-        [](int, const Vec3&, const Vec3& light) { benchmark::DoNotOptimize(light); });
+    rays += directLight(transport, lanes, samples, 0, TraceMode::Packet, kGatherDensity,
+                        [](int, const Vec3&, const Vec3& light) { benchmark::DoNotOptimize(light); });
   }
   state.SetItemsProcessed(static_cast<std::int64_t>(rays));
 }

@@ -28,7 +28,8 @@ void makeCharts(benchmark::State& state, const Scene& scene, float texelsPerMete
   options.pageSize = 1024;
   double triangles = 0;
   for (const Instance& instance : scene.instances)
-    for (const Primitive& p : scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives) triangles += static_cast<double>(p.triangleCount());
+    for (const Primitive& p : scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives)
+      triangles += static_cast<double>(p.triangleCount());
   for (auto _ : state) {
     std::ofstream("/proc/self/clear_refs") << "5";  // forgets the peak so far
     const double before = processMemory("VmRSS");
@@ -49,14 +50,19 @@ void makeCharts(benchmark::State& state, const Scene& scene, float texelsPerMete
 void BM_ChartsTerrain(benchmark::State& state) { makeCharts(state, terrain(static_cast<int>(state.range(0)), 100), 8); }
 BENCHMARK(BM_ChartsTerrain)->Arg(95)->Arg(271)->Unit(benchmark::kMillisecond)->UseManualTime();
 void BM_ChartsLargeTerrain(benchmark::State& state) { BM_ChartsTerrain(state); }
-BENCHMARK(BM_ChartsLargeTerrain)->Arg(500)->Arg(775)->Arg(1000)->Unit(benchmark::kMillisecond)->UseManualTime()->Iterations(1);
+BENCHMARK(BM_ChartsLargeTerrain)
+    ->Arg(500)
+    ->Arg(775)
+    ->Arg(1000)
+    ->Unit(benchmark::kMillisecond)
+    ->UseManualTime()
+    ->Iterations(1);
 
 /// A closed band that unrolls whole: 4 * sides^2 triangles.
 void BM_ChartsPipe(benchmark::State& state) {
   const auto sides = static_cast<int>(state.range(0));
-  Shape pipe = grid(sides, 2 * sides, true, false, [](double u, double v) {
-    return Vec3(10 * std::cos(kTau * u), 10 * std::sin(kTau * u), 50 * v);
-  });
+  Shape pipe = grid(sides, 2 * sides, true, false,
+                    [](double u, double v) { return Vec3(10 * std::cos(kTau * u), 10 * std::sin(kTau * u), 50 * v); });
   smoothNormals(pipe);
   makeCharts(state, pipe.scene(), 10);
 }

@@ -1,4 +1,5 @@
-// Speed of packing, texel finding, footprints, projection, denoising and dilation. Figures mean something on an idle machine only.
+// Speed of packing, texel finding, footprints, projection, denoising and dilation. Figures mean something on an idle
+// machine only.
 #include <benchmark/benchmark.h>
 
 #include <cmath>

@@ -90,8 +90,9 @@ TEST(Bake, TheGatherIsDenoisedAndPathTracingIsNot) {
   writeFile(dir / "furnace.gltf", gltf.dump());
   // Relative spread of the flat map around the furnace's light.
   const auto spread = [&](const std::string& name, const std::vector<std::string>& options) {
-    std::vector<std::string> arguments = {"bake", dir / "furnace.gltf", "-o",        dir / name, "--uv",   "scene",
-                                          "--page-size", "48",          "--bounces", "1",        "--dilate", "0"};
+    std::vector<std::string> arguments = {
+        "bake", dir / "furnace.gltf", "-o", dir / name, "--uv", "scene", "--page-size",
+        "48",   "--bounces",          "1",  "--dilate", "0"};
     arguments.insert(arguments.end(), options.begin(), options.end());
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.exitCode, 0) << outcome.err;
@@ -120,8 +121,8 @@ TEST(Bake, TargetErrorInPercentOrAsANumber) {
   gltf["materials"][0]["emissiveFactor"] = {1.0, 1.0, 1.0};
   writeFile(dir / "box.gltf", gltf.dump());
   for (const std::string error : {"20%", "0.2"}) {
-    const Outcome outcome = run({"bake", dir / "box.gltf", "-o", dir / error, "--uv", "scene", "--page-size", "16",
-                                 "--target-error", error});
+    const Outcome outcome = run(
+        {"bake", dir / "box.gltf", "-o", dir / error, "--uv", "scene", "--page-size", "16", "--target-error", error});
     ASSERT_EQ(outcome.exitCode, 0) << outcome.err;
     EXPECT_EQ(readJson(dir / error / "bake.json")["settings"]["target-error"], 0.2);
   }

@@ -219,7 +219,8 @@ TEST(Info, DescribesScenesImagesAndBakes) {
   glass["materials"][0]["alphaMode"] = "BLEND";
   glass["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {1.0, 1.0, 1.0, 0.0};
   writeFile(dir / "glass.gltf", glass.dump());
-  EXPECT_EQ(nlohmann::json::parse(run({"info", dir / "glass.gltf", "--json"}).out, nullptr, false)["estimate"], nullptr);
+  EXPECT_EQ(nlohmann::json::parse(run({"info", dir / "glass.gltf", "--json"}).out, nullptr, false)["estimate"],
+            nullptr);
   ASSERT_EQ(run({"bake", scene, "-o", dir / "out", "--samples", "1", "--page-size", "16", "--sky-color", "1", "1", "1"})
                 .exitCode,
             0);

@@ -19,8 +19,7 @@ class FullDisk : public testing::Test {
     Image noise(96, 96, 1);
     std::uint32_t state = 1;
     for (float& v : noise.pixels) v = static_cast<float>((state = state * 1664525 + 1013904223) >> 24) / 255.0f;
-    ASSERT_TRUE(
-        writeImage(folder_ / "h.png", noise, {.format = PixelFormat::U8, .channelNames = {}, .metadata = {}}));
+    ASSERT_TRUE(writeImage(folder_ / "h.png", noise, {.format = PixelFormat::U8, .channelNames = {}, .metadata = {}}));
   }
 
   void expectFailure(const std::vector<std::string>& arguments) {

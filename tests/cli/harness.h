@@ -23,14 +23,15 @@ struct Outcome {
 
 /// What a process starts with.
 struct Surroundings {
-  std::filesystem::path folder;    // empty: the test's own
-  std::size_t fileSizeLimit = 0;   // bytes at which a write to any file fails, as on a full disk; 0: none
+  std::filesystem::path folder;   // empty: the test's own
+  std::size_t fileSizeLimit = 0;  // bytes at which a write to any file fails, as on a full disk; 0: none
 };
 
 /// Runs `lumel ARGUMENTS...` with both outputs in pipes.
 Outcome run(const std::vector<std::string>& arguments, const Surroundings& surroundings = {});
 
-/// The same with all output on a terminal; `out` holds what the terminal got. Nothing where the system has none to give.
+/// The same with all output on a terminal; `out` holds what the terminal got. Nothing where the system has none to
+/// give.
 std::optional<Outcome> runOnTerminal(const std::vector<std::string>& arguments, const Surroundings& surroundings = {});
 
 /// Starts it, sends SIGINT once its standard error holds `sign`, and waits for the end.

@@ -19,9 +19,9 @@ Json sceneWithSquare(float size) {
 }
 
 Outcome bake(const std::filesystem::path& scene, const std::filesystem::path& out, std::vector<std::string> more = {}) {
-  std::vector<std::string> arguments = {"bake",          scene,     "-o",   out, "--uv",         "generate", "--samples", "1",
-                                        "--bounces",     "0",       "--page-size", "128", "--sky-color", "1", "1", "1",
-                                        "--texels-per-meter", "16"};
+  std::vector<std::string> arguments = {
+      "bake",        scene, "-o",          out, "--uv", "generate", "--samples",          "1", "--bounces", "0",
+      "--page-size", "128", "--sky-color", "1", "1",    "1",        "--texels-per-meter", "16"};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return run(arguments);
 }

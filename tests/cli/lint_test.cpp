@@ -74,7 +74,9 @@ const std::vector<Case>& cases() {
       {"tiny", "charts", 1, [](std::vector<Quad>& q) { q[1].uvMost = q[1].uvLeast + Vec2(0.02f); }},
       {"density", "charts", 1, [](std::vector<Quad>& q) { q[1].uvMost = Vec2(0.98f, 0.9f); }},
       {"frame-crossing", "charts", 1, [](std::vector<Quad>& q) { q[1].uvLeast.x = 0.4f, q[1].uvMost.x = 0.7f; },
-       [](Json& gltf, const std::filesystem::path& dir) { addFrames(gltf, dir, {0, 1, 0}); }},
+       [](Json& gltf, const std::filesystem::path& dir) {
+         addFrames(gltf, dir, {0, 1, 0});
+       }},
       {"gap", "charts", 2, [](std::vector<Quad>& q) { q[1].uvLeast.x = 0.42f, q[1].uvMost.x = 0.72f; }},
   };
   return all;

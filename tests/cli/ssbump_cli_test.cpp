@@ -144,9 +144,9 @@ TEST_F(SsbumpCli, BadInputIsNamedAndLeavesNothing) {
   ASSERT_EQ(lumel("h.png -o unused.png --save-normal n.png --height-scale 8 -q").code, 0);
   fs::remove(folder_ / "unused.png");
   const std::size_t before = files();
-  for (const char* wrong :
-       {"absent.png", "empty.png", "text.png", "inf.exr", "h.png --channel Z", "h.png --height-scale 1e9", "n.png",
-        "h.png --normal-map h.png", "h.png --mask one.png", "h.png --basis text.png", "h.png --albedo absent.png", "h.png --detail h.png"}) {
+  for (const char* wrong : {"absent.png", "empty.png", "text.png", "inf.exr", "h.png --channel Z",
+                            "h.png --height-scale 1e9", "n.png", "h.png --normal-map h.png", "h.png --mask one.png",
+                            "h.png --basis text.png", "h.png --albedo absent.png", "h.png --detail h.png"}) {
     const Ran ran = lumel(std::string(wrong) + " -o s.png -q");
     EXPECT_EQ(ran.code, 3) << wrong << "\n" << ran.output;
     EXPECT_EQ(std::count(ran.output.begin(), ran.output.end(), '\n'), 1) << wrong << "\n" << ran.output;

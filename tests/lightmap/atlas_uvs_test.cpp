@@ -42,7 +42,8 @@ Expected<AtlasResult> withSceneUvs(const Scene& scene, UvSource source) {
 }
 
 TEST(SceneUvs, AreUsedAsTheyAreAndShareAPageWhereTheyCan) {
-  const Scene scene = litScene({litSquare(0, {0, 0}, {0.5f, 0.5f}), litSquare(2, {0.5f, 0}, {1, 0.5f}), litSquare(4, {0, 0}, {1, 1})});
+  const Scene scene =
+      litScene({litSquare(0, {0, 0}, {0.5f, 0.5f}), litSquare(2, {0.5f, 0}, {1, 0.5f}), litSquare(4, {0, 0}, {1, 1})});
   const Expected<AtlasResult> result = withSceneUvs(scene, UvSource::Scene);
   ASSERT_TRUE(result);
   const Atlas& atlas = result->atlas;

@@ -47,7 +47,9 @@ double rmsError(const Image& map, const Truth& truth) {
 }
 
 TEST(Denoise, SmoothLightKeepsATenthOfItsNoiseAndItsMean) {
-  const auto truth = [](int x, int y) { return 1.0f + 0.002f * static_cast<float>(x) + 0.001f * static_cast<float>(y); };
+  const auto truth = [](int x, int y) {
+    return 1.0f + 0.002f * static_cast<float>(x) + 0.001f * static_cast<float>(y);
+  };
   Page page(truth, 0.1f);
   page.denoise();
   // The mean of 121 alike texels would keep 1/11 = 0.009; the weights are not all alike, and noise of the weights

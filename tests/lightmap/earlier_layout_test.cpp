@@ -14,8 +14,13 @@ namespace lumel {
 namespace {
 
 RememberedLayout layoutOf(const Atlas& atlas, const AtlasOptions& options) {
-  RememberedLayout layout{atlas.chartDensity,  atlas.chartScale,   options.pageSize, options.padding,
-                          options.blockAlign, options.maxStretch, {}};
+  RememberedLayout layout{atlas.chartDensity,
+                          atlas.chartScale,
+                          options.pageSize,
+                          options.padding,
+                          options.blockAlign,
+                          options.maxStretch,
+                          {}};
   for (const Chart& chart : atlas.charts) {
     const int page = atlas.surfaces[static_cast<std::size_t>(chart.surface)].page;
     layout.charts.push_back({chart.key, {page, chart.quarterTurns, chart.x, chart.y}});
@@ -63,7 +68,8 @@ TEST(EarlierLayout, OnlyWhatChangedMoves) {
     EXPECT_GT(second->report.keptShare, 0.8);
     EXPECT_EQ(measureAtlas(second->atlas).overlapTexels, 0.0);
     std::map<std::string, std::vector<Vec2>> uvs;
-    for (const Surface& s : first->atlas.surfaces) uvs[scene.instances[static_cast<std::size_t>(s.instance)].name] = s.lightmapUvs;
+    for (const Surface& s : first->atlas.surfaces)
+      uvs[scene.instances[static_cast<std::size_t>(s.instance)].name] = s.lightmapUvs;
     for (const Surface& s : second->atlas.surfaces)
       if (const std::string& name = edited.instances[static_cast<std::size_t>(s.instance)].name; name != "box 5") {
         EXPECT_EQ(s.lightmapUvs, uvs[name]) << name;

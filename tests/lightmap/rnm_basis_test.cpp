@@ -28,9 +28,7 @@ TEST(RnmWeights, BasisNormalReadsOneMapAlone) {
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(rnmWeights(kRnmBasis[i])[i], 1.0, 1e-6);
 }
 
-TEST(RnmWeights, NormalBelowTheSurfaceGivesZeroNotNan) {
-  EXPECT_EQ(rnmWeights(Vec3(0, 0, -1)), Vec3(0.0f));
-}
+TEST(RnmWeights, NormalBelowTheSurfaceGivesZeroNotNan) { EXPECT_EQ(rnmWeights(Vec3(0, 0, -1)), Vec3(0.0f)); }
 
 }  // namespace
 }  // namespace lumel

@@ -24,7 +24,8 @@ Scene Shape::scene() const { return sceneOf(positions, indices, normals); }
 
 Shape box(Vec3 low, Vec3 high) {
   Shape s;
-  for (int i = 0; i < 8; ++i) s.positions.push_back({i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z});
+  for (int i = 0; i < 8; ++i)
+    s.positions.push_back({i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z});
   s.quad(0, 4, 6, 2);
   s.quad(1, 3, 7, 5);
   s.quad(0, 1, 5, 4);

@@ -29,7 +29,8 @@ Shape grid(int columns, int rows, bool wrapColumns, bool wrapRows, Point point) 
   const int width = wrapColumns ? columns : columns + 1;
   const int height = wrapRows ? rows : rows + 1;
   for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) s.positions.push_back(point(static_cast<double>(x) / columns, static_cast<double>(y) / rows));
+    for (int x = 0; x < width; ++x)
+      s.positions.push_back(point(static_cast<double>(x) / columns, static_cast<double>(y) / rows));
   const auto at = [&](int x, int y) { return static_cast<std::uint32_t>((y % height) * width + x % width); };
   for (int y = 0; y < rows; ++y)
     for (int x = 0; x < columns; ++x) s.quad(at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1));

@@ -117,8 +117,8 @@ TEST(ImageIo, IndexedColoursAreNamed) {
 /// A texture of a type that the loaders let through must also be decodable: the type is told by the bytes alone.
 TEST(ImageIo, GifInMemoryIsRead) {
   // One white pixel: header, a palette of two, an image of one LZW block.
-  const std::vector<std::uint8_t> gif = {'G',  'I', 'F', '8', '9', 'a', 1, 0, 1, 0, 0x80, 0, 0, 0xFF, 0xFF, 0xFF, 0, 0,
-                                         0, ',', 0,   0,   0,   0,   1, 0, 1, 0, 0,    2, 2, 0x44, 1,    0,    ';'};
+  const std::vector<std::uint8_t> gif = {'G', 'I', 'F', '8', '9', 'a', 1, 0, 1, 0, 0x80, 0, 0, 0xFF, 0xFF, 0xFF, 0,  0,
+                                         0,   ',', 0,   0,   0,   0,   1, 0, 1, 0, 0,    2, 2, 0x44, 1,    0,    ';'};
   auto image = readImage(gif, "pixel.gif");
   ASSERT_TRUE(image) << image.error().message;
   EXPECT_EQ(image->format, "gif");
@@ -154,8 +154,8 @@ TEST(ImageIo, CutOffFilesOfAnyFormatAreErrors) {
   for (const char* name : {"cut.png", "cut.jpg", "cut.tga", "cut.tif", "cut.exr", "cut.hdr", "cut.bmp", "cut.webp"}) {
     const fs::path file = scratch() / name;
     const bool isFloat = file.extension() == ".exr" || file.extension() == ".hdr";
-    ASSERT_TRUE(writeImage(file, image,
-                           {.format = isFloat ? PixelFormat::Float : PixelFormat::U8, .channelNames = {}, .metadata = {}}))
+    ASSERT_TRUE(writeImage(
+        file, image, {.format = isFloat ? PixelFormat::Float : PixelFormat::U8, .channelNames = {}, .metadata = {}}))
         << name;
     std::vector<std::uint8_t> bytes;
     {

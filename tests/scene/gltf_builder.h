@@ -29,10 +29,14 @@ struct GltfBuilder {
 
   template <class T>
   static constexpr int componentType() {
-    if constexpr (std::is_same_v<T, float>) return 5126;
-    else if constexpr (sizeof(T) == 4) return 5125;
-    else if constexpr (sizeof(T) == 2) return std::is_signed_v<T> ? 5122 : 5123;
-    else return std::is_signed_v<T> ? 5120 : 5121;
+    if constexpr (std::is_same_v<T, float>)
+      return 5126;
+    else if constexpr (sizeof(T) == 4)
+      return 5125;
+    else if constexpr (sizeof(T) == 2)
+      return std::is_signed_v<T> ? 5122 : 5123;
+    else
+      return std::is_signed_v<T> ? 5120 : 5121;
   }
 
   /// Appends an accessor ("VEC3", ...) over its own tightly packed view; returns its index.
@@ -98,8 +102,8 @@ struct GltfBuilder {
 };
 
 /// The scene, or an empty one with the error as a test failure.
-#define LOAD_OR_FAIL(scene, expression)              \
-  auto scene##Loaded = (expression);                 \
+#define LOAD_OR_FAIL(scene, expression)                        \
+  auto scene##Loaded = (expression);                           \
   ASSERT_TRUE(scene##Loaded) << scene##Loaded.error().message; \
   const Scene& scene = *scene##Loaded
 

@@ -29,7 +29,8 @@ TEST(GltfMeshopt, ExponentialPositionsAndQuaternionRotations) {
   const int p = compressedView(g, kPositionsTimes3Exponential, 4, 12, "ATTRIBUTES", "EXPONENTIAL");
   const int q = compressedView(g, kRotationsQuaternion, 2, 8, "ATTRIBUTES", "QUATERNION");
   g.json["accessors"][0]["bufferView"] = p;
-  const int rotations = g.add("accessors", {{"bufferView", q}, {"componentType", 5122}, {"normalized", true}, {"count", 2}, {"type", "VEC4"}});
+  const int rotations = g.add(
+      "accessors", {{"bufferView", q}, {"componentType", 5122}, {"normalized", true}, {"count", 2}, {"type", "VEC4"}});
   g.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["ROTATION"] = rotations;
   g.json["buffers"][0]["byteLength"] = g.bin.size();
   LOAD_OR_FAIL(scene, g.load());
@@ -46,11 +47,15 @@ TEST(GltfMeshopt, DamageIsAnErrorThatNamesTheView) {
     auto result = g.load();
     return result ? std::string("(it loads)") : result.error().message;
   };
-  EXPECT_TRUE(mentions(message([](Json& e) { e["byteLength"] = 40; }), "test.glb: bufferViews/0/extensions/EXT_meshopt_compression: its compressed bytes cannot be decoded"));
+  EXPECT_TRUE(
+      mentions(message([](Json& e) { e["byteLength"] = 40; }),
+               "test.glb: bufferViews/0/extensions/EXT_meshopt_compression: its compressed bytes cannot be decoded"));
   EXPECT_TRUE(mentions(message([](Json& e) { e["byteLength"] = 4000; }), "lie outside their buffer"));
-  EXPECT_TRUE(mentions(message([](Json& e) { e["count"] = 2000000000; }), "a count of 2000000000 cannot come from 67 bytes"));
+  EXPECT_TRUE(
+      mentions(message([](Json& e) { e["count"] = 2000000000; }), "a count of 2000000000 cannot come from 67 bytes"));
   EXPECT_TRUE(mentions(message([](Json& e) { e["byteStride"] = 13; }), "byteStride 13 does not fit"));
-  EXPECT_TRUE(mentions(message([](Json& e) { e["filter"] = "COLOR"; }), "filter 'COLOR' with byteStride 12 is not supported"));
+  EXPECT_TRUE(
+      mentions(message([](Json& e) { e["filter"] = "COLOR"; }), "filter 'COLOR' with byteStride 12 is not supported"));
   EXPECT_TRUE(mentions(message([](Json& e) { e["mode"] = "STRIPS"; }), "bufferViews/0"));
 }
 
@@ -71,7 +76,9 @@ TEST(GltfDraco, DamageAndWrongIdsAreErrors) {
   g.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["attributes"]["POSITION"] = 9;
   auto wrongId = g.load();
   ASSERT_FALSE(wrongId);
-  EXPECT_TRUE(mentions(wrongId.error().message, "test.glb: meshes/0/primitives/0/extensions/KHR_draco_mesh_compression: has no Draco attribute 9 for POSITION"));
+  EXPECT_TRUE(mentions(
+      wrongId.error().message,
+      "test.glb: meshes/0/primitives/0/extensions/KHR_draco_mesh_compression: has no Draco attribute 9 for POSITION"));
   g = dracoSquare();
   g.json["bufferViews"][0]["byteLength"] = 60;
   auto cut = g.load();

@@ -45,14 +45,17 @@ TEST(GltfErrors, Container) {
   EXPECT_TRUE(mentions(errorOf(loadGltf(bytes, "cut.glb", "", {})), "the header is cut off at 10 bytes"));
   auto old = g.glb();
   old[4] = 1;
-  EXPECT_EQ(errorOf(loadGltf(old, "old.glb", "", {})), "old.glb: GLB container: version 1 is not 2; convert the file to glTF 2.0");
+  EXPECT_EQ(errorOf(loadGltf(old, "old.glb", "", {})),
+            "old.glb: GLB container: version 1 is not 2; convert the file to glTF 2.0");
   EXPECT_TRUE(mentions(errorOf(loadGltf({}, "empty.gltf", "", {})), "empty.gltf: JSON: "));
 }
 
 TEST(GltfErrors, Json) {
-  EXPECT_TRUE(mentions(textError("{\"asset\": {\"version\": \"2.0\"}, }"), "test.gltf: JSON: parse error at line 1, column 3"));
+  EXPECT_TRUE(
+      mentions(textError("{\"asset\": {\"version\": \"2.0\"}, }"), "test.gltf: JSON: parse error at line 1, column 3"));
   EXPECT_TRUE(mentions(textError("[]"), "asset/version: is missing"));
-  EXPECT_EQ(textError("{\"asset\": {\"version\": \"1.0\"}}"), "test.gltf: asset/version: '1.0' is not 2.x; convert the file to glTF 2.0");
+  EXPECT_EQ(textError("{\"asset\": {\"version\": \"1.0\"}}"),
+            "test.gltf: asset/version: '1.0' is not 2.x; convert the file to glTF 2.0");
   EXPECT_EQ(textError("{\"asset\": {\"version\": \"2.1\", \"minVersion\": \"2.1\"}}"),
             "test.gltf: asset/minVersion: '2.1' asks for more than glTF 2.0; export as 2.0");
   std::string deep = "{\"asset\": {\"version\": \"2.0\"}, \"extras\": ";
@@ -61,74 +64,119 @@ TEST(GltfErrors, Json) {
 }
 
 TEST(GltfErrors, RequiredExtensionsAreNamed) {
-  EXPECT_EQ(broken([](auto& g) { g.json["extensionsRequired"] = {"KHR_texture_transform", "ACME_teapots"}; }),
+  EXPECT_EQ(broken([](auto& g) {
+              g.json["extensionsRequired"] = {"KHR_texture_transform", "ACME_teapots"};
+            }),
             "test.glb: extensionsRequired: 'ACME_teapots' is not supported; export without it");
-  EXPECT_EQ(broken([](auto& g) { g.json["extensionsUsed"] = {"ACME_teapots", "KHR_materials_variants"}; }), "(it loads)");
+  EXPECT_EQ(broken([](auto& g) {
+              g.json["extensionsUsed"] = {"ACME_teapots", "KHR_materials_variants"};
+            }),
+            "(it loads)");
 }
 
 TEST(GltfErrors, IndicesOutOfRangeInTheJson) {
-  const std::pair<const char*, const char*> cases[] = {
-      {"/meshes/0/primitives/0/attributes/POSITION", "accessors"}, {"/meshes/0/primitives/0/indices", "accessors"},
-      {"/meshes/0/primitives/0/material", "materials"},            {"/accessors/0/bufferView", "bufferViews"},
-      {"/bufferViews/0/buffer", "buffers"},                        {"/nodes/0/mesh", "meshes"},
-      {"/nodes/0/children/0", "nodes"},                            {"/nodes/0/camera", "cameras"},
-      {"/nodes/0/skin", "skins"},                                  {"/scene", "scenes"}};
+  const std::pair<const char*, const char*> cases[] = {{"/meshes/0/primitives/0/attributes/POSITION", "accessors"},
+                                                       {"/meshes/0/primitives/0/indices", "accessors"},
+                                                       {"/meshes/0/primitives/0/material", "materials"},
+                                                       {"/accessors/0/bufferView", "bufferViews"},
+                                                       {"/bufferViews/0/buffer", "buffers"},
+                                                       {"/nodes/0/mesh", "meshes"},
+                                                       {"/nodes/0/children/0", "nodes"},
+                                                       {"/nodes/0/camera", "cameras"},
+                                                       {"/nodes/0/skin", "skins"},
+                                                       {"/scene", "scenes"}};
   for (const auto& [pointer, array] : cases)
     for (const Json& value : {Json(99), Json(-1)}) {
-      const std::string expected = std::string("test.glb: ") + (pointer + 1) + ": is " + value.dump() + ", but there are ";
-      EXPECT_EQ(broken([&, p = pointer](auto& g) { g.json[Json::json_pointer(p)] = value; }).substr(0, expected.size()), expected)
+      const std::string expected =
+          std::string("test.glb: ") + (pointer + 1) + ": is " + value.dump() + ", but there are ";
+      EXPECT_EQ(broken([&, p = pointer](auto& g) { g.json[Json::json_pointer(p)] = value; }).substr(0, expected.size()),
+                expected)
           << array;
     }
   EXPECT_EQ(broken([](auto& g) { g.json["accessors"][0]["count"] = -4; }),
             "test.glb: accessors/0/count: must be a whole number, not negative");
-  EXPECT_EQ(broken([](auto& g) { g.json["nodes"][0]["scale"] = {1, 1}; }), "test.glb: nodes/0/scale: must have 3 numbers");
-  EXPECT_EQ(broken([](auto& g) { g.json["nodes"][0]["mesh"] = "wall"; }), "test.glb: nodes/0/mesh: must be an index into meshes");
+  EXPECT_EQ(broken([](auto& g) {
+              g.json["nodes"][0]["scale"] = {1, 1};
+            }),
+            "test.glb: nodes/0/scale: must have 3 numbers");
+  EXPECT_EQ(broken([](auto& g) { g.json["nodes"][0]["mesh"] = "wall"; }),
+            "test.glb: nodes/0/mesh: must be an index into meshes");
 }
 
 TEST(GltfErrors, VertexIndexOutOfRange) {
-  EXPECT_EQ(broken([](auto& g) { g.json["meshes"][0]["primitives"][0]["indices"] = g.template accessor<std::uint16_t>("SCALAR", {0, 1, 2, 0, 2, 9}); }),
+  EXPECT_EQ(broken([](auto& g) {
+              g.json["meshes"][0]["primitives"][0]["indices"] =
+                  g.template accessor<std::uint16_t>("SCALAR", {0, 1, 2, 0, 2, 9});
+            }),
             "test.glb: meshes/0/primitives/0/indices: entry 5 is 9, but there are 4 vertices; export again");
 }
 
 TEST(GltfErrors, AccessorsBeyondTheirBytes) {
-  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["accessors"][0]["count"] = 5; }), "test.glb: accessors/0: 5 elements from byte 0 on do not fit bufferViews/0, which has 48 bytes"));
-  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["accessors"][0]["count"] = std::uint64_t{1} << 62; }), "test.glb: accessors/0: "));
-  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["accessors"][0]["byteOffset"] = (std::uint64_t{1} << 63) - 1; }), "test.glb: accessors/0: "));
-  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["bufferViews"][0]["byteLength"] = 100000; }), "test.glb: bufferViews/0: 100000 bytes from 0 on do not fit buffers/0"));
-  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["bufferViews"][0]["byteStride"] = 4; }), "accessors/0: byteStride 4 is less than an element's 12 bytes"));
+  EXPECT_TRUE(
+      mentions(broken([](auto& g) { g.json["accessors"][0]["count"] = 5; }),
+               "test.glb: accessors/0: 5 elements from byte 0 on do not fit bufferViews/0, which has 48 bytes"));
+  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["accessors"][0]["count"] = std::uint64_t{1} << 62; }),
+                       "test.glb: accessors/0: "));
+  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["accessors"][0]["byteOffset"] = (std::uint64_t{1} << 63) - 1; }),
+                       "test.glb: accessors/0: "));
+  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["bufferViews"][0]["byteLength"] = 100000; }),
+                       "test.glb: bufferViews/0: 100000 bytes from 0 on do not fit buffers/0"));
+  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["bufferViews"][0]["byteStride"] = 4; }),
+                       "accessors/0: byteStride 4 is less than an element's 12 bytes"));
   EXPECT_TRUE(mentions(broken([](auto& g) {
-              g.json["accessors"][0].erase("bufferView");
-              g.json["accessors"][0]["count"] = std::uint64_t{1} << 40;
-            }), "elements without a bufferView"));
-  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["accessors"][0]["type"] = "VEC2"; }), "accessors/0: has 2 components where 3 are needed"));
-  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["accessors"][1]["count"] = 3; }), "meshes/0/primitives/0/attributes/TEXCOORD_0: has 3 elements, but there are 4 vertices"));
+                         g.json["accessors"][0].erase("bufferView");
+                         g.json["accessors"][0]["count"] = std::uint64_t{1} << 40;
+                       }),
+                       "elements without a bufferView"));
+  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["accessors"][0]["type"] = "VEC2"; }),
+                       "accessors/0: has 2 components where 3 are needed"));
+  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["accessors"][1]["count"] = 3; }),
+                       "meshes/0/primitives/0/attributes/TEXCOORD_0: has 3 elements, but there are 4 vertices"));
 }
 
 TEST(GltfErrors, SparseIndexOutOfRange) {
   EXPECT_TRUE(mentions(broken([](auto& g) {
-              const std::uint8_t index[] = {4};
-              const float value[] = {1, 2, 3};
-              const int i = g.view(index, 1), v = g.view(value, 12);
-              g.json["accessors"][0]["sparse"] = {{"count", 1}, {"indices", {{"bufferView", i}, {"componentType", 5121}}}, {"values", {{"bufferView", v}}}};
-            }), "accessors/0/sparse/indices: entry 0 is 4, but the accessor has 4 elements"));
+                         const std::uint8_t index[] = {4};
+                         const float value[] = {1, 2, 3};
+                         const int i = g.view(index, 1), v = g.view(value, 12);
+                         g.json["accessors"][0]["sparse"] = {{"count", 1},
+                                                             {"indices", {{"bufferView", i}, {"componentType", 5121}}},
+                                                             {"values", {{"bufferView", v}}}};
+                       }),
+                       "accessors/0/sparse/indices: entry 0 is 4, but the accessor has 4 elements"));
 }
 
 TEST(GltfErrors, PositionsThatAreNotFinite) {
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()})
-    EXPECT_EQ(broken([&](auto& g) { g.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = g.template accessor<float>("VEC3", {0, 0, 0, 1, 0, 0, 1, bad, 0, 0, 1, 0}); }),
-              "test.glb: meshes/0/primitives/0/attributes/POSITION: vertex 2 is not finite; repair the mesh and export again");
+    EXPECT_EQ(broken([&](auto& g) {
+                g.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] =
+                    g.template accessor<float>("VEC3", {0, 0, 0, 1, 0, 0, 1, bad, 0, 0, 1, 0});
+              }),
+              "test.glb: meshes/0/primitives/0/attributes/POSITION: vertex 2 is not finite; repair the mesh and export "
+              "again");
 }
 
 TEST(GltfErrors, NodeCyclesAndSharedChildren) {
-  EXPECT_EQ(broken([](auto& g) { g.json["nodes"] = {{{"children", {1}}}, {{"children", {0}}, {"mesh", 0}}}; }),
+  EXPECT_EQ(broken([](auto& g) {
+              g.json["nodes"] = {{{"children", {1}}}, {{"children", {0}}, {"mesh", 0}}};
+            }),
             "test.glb: nodes/0: is its own ancestor; correct the node tree");
-  EXPECT_EQ(broken([](auto& g) { g.json["nodes"] = {{{"children", {0}}}}; }), "test.glb: nodes/0: is its own ancestor; correct the node tree");
-  EXPECT_EQ(broken([](auto& g) { g.json["nodes"] = {{{"children", {2}}}, {{"children", {2}}}, {{"mesh", 0}}}; }),
+  EXPECT_EQ(broken([](auto& g) {
+              g.json["nodes"] = {{{"children", {0}}}};
+            }),
+            "test.glb: nodes/0: is its own ancestor; correct the node tree");
+  EXPECT_EQ(broken([](auto& g) {
+              g.json["nodes"] = {{{"children", {2}}}, {{"children", {2}}}, {{"mesh", 0}}};
+            }),
             "test.glb: nodes/1/children/0: node 2 is already a child of node 0; a node has one parent");
 }
 
 TEST(GltfErrors, TransformsThatOverflow) {
-  EXPECT_TRUE(mentions(broken([](auto& g) { g.json["nodes"] = {{{"scale", {1e15, 1, 1}}, {"children", {1}}}, {{"scale", {1e15, 1, 1}}, {"mesh", 0}}}; }), "test.glb: nodes/1: its transform reaches beyond 1e18 m"));
+  EXPECT_TRUE(mentions(
+      broken([](auto& g) {
+        g.json["nodes"] = {{{"scale", {1e15, 1, 1}}, {"children", {1}}}, {{"scale", {1e15, 1, 1}}, {"mesh", 0}}};
+      }),
+      "test.glb: nodes/1: its transform reaches beyond 1e18 m"));
 }
 
 class GltfFiles : public testing::Test {
@@ -161,14 +209,16 @@ TEST_F(GltfFiles, MissingAndShortBuffers) {
   EXPECT_TRUE(mentions(errorOf(loadWith("gone.bin")), "gone.bin: no such file; put the buffer beside the scene file"));
   write(folder_ / "scene" / "short.bin", binText().substr(0, 40));
   EXPECT_TRUE(mentions(errorOf(loadWith("short.bin")), "buffers/0: has 40 of its "));
-  EXPECT_TRUE(mentions(errorOf(loadWith("data:application/octet-stream;base64,!!!")), "buffers/0/uri: is a data URI with a character that is not base64"));
+  EXPECT_TRUE(mentions(errorOf(loadWith("data:application/octet-stream;base64,!!!")),
+                       "buffers/0/uri: is a data URI with a character that is not base64"));
 }
 
 TEST_F(GltfFiles, PathsStayInTheScenesFolderUnlessAllowed) {
   write(folder_ / "outside.bin", binText());
   LoadOptions allow;
   allow.allowOutsidePaths = true;
-  for (const std::string& uri : {std::string("../outside.bin"), (folder_ / "outside.bin").string(), std::string("x/../../outside.bin")}) {
+  for (const std::string& uri :
+       {std::string("../outside.bin"), (folder_ / "outside.bin").string(), std::string("x/../../outside.bin")}) {
     EXPECT_TRUE(mentions(errorOf(loadWith(uri)), "leaves the scene's folder")) << uri;
     EXPECT_EQ(errorOf(loadWith(uri, allow)), "(it loads)") << uri;
   }
@@ -181,7 +231,8 @@ TEST_F(GltfFiles, PathsStayInTheScenesFolderUnlessAllowed) {
 }
 
 TEST_F(GltfFiles, WrongExtensionAndMissingFile) {
-  EXPECT_TRUE(mentions(errorOf(loadScene(folder_ / "level.fbx")), "level.fbx: is not a scene file that can be read; use .gltf, .glb or .obj"));
+  EXPECT_TRUE(mentions(errorOf(loadScene(folder_ / "level.fbx")),
+                       "level.fbx: is not a scene file that can be read; use .gltf, .glb or .obj"));
   EXPECT_TRUE(mentions(errorOf(loadScene(folder_ / "level.glb")), "level.glb: no such file"));
   EXPECT_TRUE(mentions(errorOf(loadScene(folder_ / "scene.glb")), "no such file"));
   fs::create_directories(folder_ / "dir.glb");
@@ -191,7 +242,8 @@ TEST_F(GltfFiles, WrongExtensionAndMissingFile) {
 TEST_F(GltfFiles, MissingTexturesAreWarningsAndOutsideOnesErrors) {
   write(folder_ / "scene" / "b.bin", binText());
   builder_.json["meshes"][0]["primitives"][0]["material"] = 0;
-  builder_.json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"baseColorFactor", {0.5, 0.25, 0.125, 1}}}}}};
+  builder_.json["materials"] = {
+      {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"baseColorFactor", {0.5, 0.25, 0.125, 1}}}}}};
   builder_.json["textures"] = {{{"source", 0}}};
   builder_.json["images"] = {{{"uri", "gone.png"}}};
   auto scene = loadWith("b.bin");

@@ -8,7 +8,8 @@ namespace {
 using Json = nlohmann::json;
 
 Vec3 faceNormal(const Primitive& p, std::size_t t) {
-  const Vec3 a = p.positions[p.indices[3 * t]], b = p.positions[p.indices[3 * t + 1]], c = p.positions[p.indices[3 * t + 2]];
+  const Vec3 a = p.positions[p.indices[3 * t]], b = p.positions[p.indices[3 * t + 1]],
+             c = p.positions[p.indices[3 * t + 2]];
   return glm::normalize(glm::cross(b - a, c - a));
 }
 
@@ -40,7 +41,8 @@ TEST(GltfGeometry, MissingNormalsSplitVerticesWhereTrianglesMeetAtAnAngle) {
   // Two triangles about the edge (0,0,0)-(0,0,1), at a right angle.
   const int p = g.accessor<float>("VEC3", {0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 1, 0});
   const int i = g.accessor<std::uint8_t>("SCALAR", {0, 1, 2, 1, 0, 3});
-  g.mesh({{"attributes", {{"POSITION", p}, {"TANGENT", g.accessor<float>("VEC4", std::vector<float>(16, 1))}}}, {"indices", i}});
+  g.mesh({{"attributes", {{"POSITION", p}, {"TANGENT", g.accessor<float>("VEC4", std::vector<float>(16, 1))}}},
+          {"indices", i}});
   LOAD_OR_FAIL(scene, g.load());
   const Primitive& q = scene.primitive(0, 0);
   EXPECT_EQ(q.positions.size(), 6u);
@@ -127,7 +129,8 @@ TEST(GltfGeometry, QuantizedPositionsAreReadAsTheyAre) {
   g.json["extensionsRequired"] = {"KHR_mesh_quantization"};
   std::vector<std::int16_t> points = {0, 0, 0, -300, 0, 0, 0, 300, 0};
   const int p = g.accessor<std::int16_t>("VEC3", points);
-  g.mesh({{"attributes", {{"POSITION", p}, {"NORMAL", g.accessor<std::int8_t>("VEC3", {0, 0, 127, 0, 0, 127, 0, 0, 127}, true)}}}});
+  g.mesh({{"attributes",
+           {{"POSITION", p}, {"NORMAL", g.accessor<std::int8_t>("VEC3", {0, 0, 127, 0, 0, 127, 0, 0, 127}, true)}}}});
   LOAD_OR_FAIL(scene, g.load());
   EXPECT_EQ(scene.primitive(0, 0).positions[1], Vec3(-300, 0, 0));
   EXPECT_EQ(scene.primitive(0, 0).normals[1], Vec3(0, 0, 1));
@@ -142,8 +145,11 @@ TEST(GltfGeometry, InterleavedAndOffsetAccessors) {
   Json attributes;
   const char* names[] = {"POSITION", "NORMAL", "TEXCOORD_0"};
   for (int k = 0; k < 3; ++k)
-    attributes[names[k]] = g.add("accessors", {{"bufferView", view}, {"byteOffset", 12 * k}, {"componentType", 5126},
-                                               {"count", 3}, {"type", k == 2 ? "VEC2" : "VEC3"}});
+    attributes[names[k]] = g.add("accessors", {{"bufferView", view},
+                                               {"byteOffset", 12 * k},
+                                               {"componentType", 5126},
+                                               {"count", 3},
+                                               {"type", k == 2 ? "VEC2" : "VEC3"}});
   g.mesh({{"attributes", attributes}});
   LOAD_OR_FAIL(scene, g.load());
   const Primitive& p = scene.primitive(0, 0);
@@ -172,7 +178,8 @@ TEST(GltfGeometry, SparseAccessorsOverlayBaseOrZeros) {
 TEST(GltfGeometry, ColorsUvSetsAndSeveralPrimitives) {
   GltfBuilder g;
   auto& primitive = g.square();
-  primitive["attributes"]["COLOR_0"] = g.accessor<std::uint8_t>("VEC3", std::vector<std::uint8_t>{255, 0, 0, 255, 0, 0, 255, 0, 0, 0, 255, 0}, true);
+  primitive["attributes"]["COLOR_0"] =
+      g.accessor<std::uint8_t>("VEC3", std::vector<std::uint8_t>{255, 0, 0, 255, 0, 0, 255, 0, 0, 0, 255, 0}, true);
   primitive["attributes"]["TEXCOORD_1"] = g.accessor<float>("VEC2", {0, 0, 0.5f, 0, 0.5f, 0.5f, 0, 0.5f});
   Json second = primitive;
   second["attributes"].erase("COLOR_0");

@@ -20,7 +20,8 @@ GltfBuilder textured(const Json& material) {
   GltfBuilder g;
   g.square()["material"] = 0;
   g.json["images"] = {{{"uri", kPng}}, {{"uri", kWebp}}};
-  g.json["textures"] = {{{"source", 0}}, {{"source", 0}, {"sampler", 0}, {"extensions", {{"EXT_texture_webp", {{"source", 1}}}}}}};
+  g.json["textures"] = {{{"source", 0}},
+                        {{"source", 0}, {"sampler", 0}, {"extensions", {{"EXT_texture_webp", {{"source", 1}}}}}}};
   g.json["samplers"] = {{{"wrapS", 33071}, {"wrapT", 33648}, {"magFilter", 9728}}};
   g.json["materials"] = {material};
   return g;
@@ -42,20 +43,22 @@ TEST(GltfMaterial, DefaultsAreThoseOfTheSpecification) {
 }
 
 TEST(GltfMaterial, EveryMemberIsRead) {
-  auto g = textured({{"name", "Neon"},
-                     {"pbrMetallicRoughness",
-                      {{"baseColorFactor", {0.1, 0.2, 0.3, 0.4}},
-                       {"baseColorTexture", {{"index", 0}, {"texCoord", 1}}},
-                       {"metallicFactor", 0.25},
-                       {"roughnessFactor", 0.75},
-                       {"metallicRoughnessTexture", {{"index", 0}}}}},
-                     {"normalTexture", {{"index", 0}, {"scale", 0.5}}},
-                     {"emissiveFactor", {1, 0.5, 0}},
-                     {"emissiveTexture", {{"index", 0}}},
-                     {"alphaMode", "MASK"},
-                     {"alphaCutoff", 0.3},
-                     {"doubleSided", true},
-                     {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 40}}}, {"KHR_materials_unlit", Json::object()}}}});
+  auto g = textured(
+      {{"name", "Neon"},
+       {"pbrMetallicRoughness",
+        {{"baseColorFactor", {0.1, 0.2, 0.3, 0.4}},
+         {"baseColorTexture", {{"index", 0}, {"texCoord", 1}}},
+         {"metallicFactor", 0.25},
+         {"roughnessFactor", 0.75},
+         {"metallicRoughnessTexture", {{"index", 0}}}}},
+       {"normalTexture", {{"index", 0}, {"scale", 0.5}}},
+       {"emissiveFactor", {1, 0.5, 0}},
+       {"emissiveTexture", {{"index", 0}}},
+       {"alphaMode", "MASK"},
+       {"alphaCutoff", 0.3},
+       {"doubleSided", true},
+       {"extensions",
+        {{"KHR_materials_emissive_strength", {{"emissiveStrength", 40}}}, {"KHR_materials_unlit", Json::object()}}}});
   LOAD_OR_FAIL(scene, g.load());
   const Material& m = scene.materials[0];
   EXPECT_EQ(m.name, "Neon");
@@ -91,13 +94,14 @@ TEST(GltfMaterial, WebpAndSamplers) {
 
 TEST(GltfMaterial, TextureTransformScalesTurnsAndShifts) {
   const double quarter = std::acos(0.0);
-  auto g = textured({{"pbrMetallicRoughness",
-                      {{"baseColorTexture",
-                        {{"index", 0},
-                         {"texCoord", 0},
-                         {"extensions",
-                          {{"KHR_texture_transform",
-                            {{"offset", {0.5, 0.25}}, {"rotation", quarter}, {"scale", {2, 3}}, {"texCoord", 1}}}}}}}}}});
+  auto g =
+      textured({{"pbrMetallicRoughness",
+                 {{"baseColorTexture",
+                   {{"index", 0},
+                    {"texCoord", 0},
+                    {"extensions",
+                     {{"KHR_texture_transform",
+                       {{"offset", {0.5, 0.25}}, {"rotation", quarter}, {"scale", {2, 3}}, {"texCoord", 1}}}}}}}}}});
   g.json["extensionsRequired"] = {"KHR_texture_transform"};
   LOAD_OR_FAIL(scene, g.load());
   const TextureRef& ref = scene.materials[0].baseColorMap;
@@ -132,7 +136,8 @@ TEST(GltfMaterial, SpecularGlossinessGivesItsDiffuseColour) {
 }
 
 TEST(GltfMaterial, ImagesInBufferViewsAndTexturesWithoutASource) {
-  auto g = textured({{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}, {"emissiveTexture", {{"index", 1}}}});
+  auto g =
+      textured({{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}, {"emissiveTexture", {{"index", 1}}}});
   const unsigned char jpegStart[] = {0xFF, 0xD8, 0xFF, 0xE0};
   const int view = g.view(jpegStart, 4);
   g.json["images"][0] = {{"bufferView", view}, {"mimeType", "image/png"}};
@@ -151,12 +156,14 @@ TEST(GltfMaterial, WrongMembersAreNamed) {
     return result ? std::string("(it loads)") : result.error().message;
   };
   EXPECT_EQ(message({{"alphaMode", "GLASS"}}), "test.glb: materials/0: alphaMode 'GLASS' is not OPAQUE, MASK or BLEND");
-  EXPECT_EQ(message({{"normalTexture", {{"index", 7}}}}), "test.glb: materials/0/normalTexture/index: is 7, but there are 2 textures");
+  EXPECT_EQ(message({{"normalTexture", {{"index", 7}}}}),
+            "test.glb: materials/0/normalTexture/index: is 7, but there are 2 textures");
   EXPECT_EQ(message({{"emissiveFactor", {1, 2}}}), "test.glb: materials/0/emissiveFactor: must have 3 numbers");
   EXPECT_EQ(message({{"pbrMetallicRoughness", {{"baseColorFactor", {1, 2, "x", 4}}}}}),
             "test.glb: materials/0/pbrMetallicRoughness/baseColorFactor/2: must be a number that a float can hold");
-  EXPECT_EQ(message({{"emissiveTexture", {{"index", 0}, {"extensions", {{"KHR_texture_transform", {{"scale", 2}}}}}}}}),
-            "test.glb: materials/0/emissiveTexture/extensions/KHR_texture_transform/scale: must be an array of numbers");
+  EXPECT_EQ(
+      message({{"emissiveTexture", {{"index", 0}, {"extensions", {{"KHR_texture_transform", {{"scale", 2}}}}}}}}),
+      "test.glb: materials/0/emissiveTexture/extensions/KHR_texture_transform/scale: must be an array of numbers");
 }
 
 }  // namespace

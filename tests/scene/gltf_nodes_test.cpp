@@ -97,8 +97,9 @@ TEST(GltfNodes, LightsStandWhereTheirNodesDo) {
 
 TEST(GltfNodes, CamerasIgnoreTheirNodesScale) {
   GltfBuilder g;
-  g.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 0.7}, {"znear", 0.1}, {"aspectRatio", 1.5}}}},
-                       {{"type", "orthographic"}, {"orthographic", {{"xmag", 4}, {"ymag", 2}, {"znear", 0}, {"zfar", 9}}}}};
+  g.json["cameras"] = {
+      {{"type", "perspective"}, {"perspective", {{"yfov", 0.7}, {"znear", 0.1}, {"aspectRatio", 1.5}}}},
+      {{"type", "orthographic"}, {"orthographic", {{"xmag", 4}, {"ymag", 2}, {"znear", 0}, {"zfar", 9}}}}};
   g.json["nodes"] = {{{"camera", 0}, {"translation", {1, 2, 3}}, {"scale", {5, 5, 5}}}, {{"camera", 1}}};
   LOAD_OR_FAIL(scene, g.load());
   ASSERT_EQ(scene.cameras.size(), 2u);
@@ -126,7 +127,8 @@ TEST(GltfNodes, GpuInstancing) {
   EXPECT_EQ(scene.instances[1].name, "Node[1]");
   expectNear(world(scene.instances[0], {1, 0, 0}), {1, 1, 0});
   expectNear(world(scene.instances[1], {1, 0, 0}), {5, 1, 0});
-  g.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["SCALE"] = g.accessor<float>("VEC3", {1, 1, 1});
+  g.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["SCALE"] =
+      g.accessor<float>("VEC3", {1, 1, 1});
   auto bad = g.load();
   ASSERT_FALSE(bad);
   EXPECT_TRUE(mentions(bad.error().message, "nodes/0/extensions/EXT_mesh_gpu_instancing: its attributes differ"));
@@ -136,8 +138,10 @@ TEST(GltfNodes, SkinsStandInTheFilesPose) {
   GltfBuilder g;
   auto& primitive = g.square();
   // All vertices follow joint 1, but the first is shared half and half with joint 0.
-  primitive["attributes"]["JOINTS_0"] = g.accessor<std::uint8_t>("VEC4", {0, 1, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0});
-  primitive["attributes"]["WEIGHTS_0"] = g.accessor<float>("VEC4", {0.5f, 0.5f, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0});
+  primitive["attributes"]["JOINTS_0"] =
+      g.accessor<std::uint8_t>("VEC4", {0, 1, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0});
+  primitive["attributes"]["WEIGHTS_0"] =
+      g.accessor<float>("VEC4", {0.5f, 0.5f, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0});
   std::vector<float> bind = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   std::vector<float> both = bind;
   both.insert(both.end(), bind.begin(), bind.end());
@@ -170,7 +174,8 @@ TEST(GltfNodes, ObjectSettingsFromMeshAndNodeExtras) {
   };
   EXPECT_EQ(message({{"scale", 0}}), "test.glb: nodes/0/extras/lumel: scale must be a number above 0");
   EXPECT_EQ(message({{"casts", 1}}), "test.glb: nodes/0/extras/lumel: casts must be true or false");
-  EXPECT_EQ(message({{"scales", 1}}), "test.glb: nodes/0/extras/lumel: 'scales' is not known; use scale, casts or receives");
+  EXPECT_EQ(message({{"scales", 1}}),
+            "test.glb: nodes/0/extras/lumel: 'scales' is not known; use scale, casts or receives");
 }
 
 TEST(GltfNodes, DeepTreesDoNotOverflowTheStack) {

@@ -16,7 +16,8 @@ inline constexpr const char* kPositions =
 inline constexpr const char* kPositionsTimes3Exponential =
     "oAABMwAAAGBfAAEwAAAABAABDAAAAGAAATAAAAAEAAAAATAAAAAEAAAAAAAAAAAAAAAAAAAAAAAAAAAAAADyAAAA8gAAAPI=";
 inline constexpr const char* kNormalsOctahedral = "oAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAADZ/AA==";
-inline constexpr const char* kRotationsQuaternion = "oAEQAAAAATAAAAD+AAAAAAEQAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAP9/";
+inline constexpr const char* kRotationsQuaternion =
+    "oAEQAAAAATAAAAD+AAAAAAEQAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAP9/";
 inline constexpr const char* kTriangles = "4fAAAHaHVmd4qYZliWiYAWkAAA==";
 inline constexpr const char* kIndexSequence = "0QAEBAYIBAAAAAA=";
 // Positions (11 bits), UVs (10 bits), colours (255, 51, 0, 255); attribute ids 0, 1, 2.
@@ -28,26 +29,45 @@ inline constexpr const char* kDraco =
 inline std::vector<std::uint8_t> decoded(const std::string& base64) { return *decodeDataUri("data:;base64," + base64); }
 
 /// Adds a view that is compressed with `extension` and whose plain bytes are in a buffer without any.
-inline int compressedView(GltfBuilder& g, const char* base64, int count, int stride, const char* mode, const char* filter = "NONE",
-                   const char* extension = "EXT_meshopt_compression") {
+inline int compressedView(GltfBuilder& g, const char* base64, int count, int stride, const char* mode,
+                          const char* filter = "NONE", const char* extension = "EXT_meshopt_compression") {
   const auto bytes = decoded(base64);
   const int at = g.view(bytes.data(), bytes.size());
   nlohmann::json& view = g.json["bufferViews"][static_cast<std::size_t>(at)];
-  nlohmann::json compressed = {{"buffer", 0}, {"byteOffset", view["byteOffset"]}, {"byteLength", view["byteLength"]},
-                     {"byteStride", stride}, {"count", count}, {"mode", mode}, {"filter", filter}};
+  nlohmann::json compressed = {{"buffer", 0},
+                               {"byteOffset", view["byteOffset"]},
+                               {"byteLength", view["byteLength"]},
+                               {"byteStride", stride},
+                               {"count", count},
+                               {"mode", mode},
+                               {"filter", filter}};
   view = {{"buffer", 1}, {"byteLength", count * stride}, {"extensions", {{extension, compressed}}}};
   return at;
 }
 
-inline GltfBuilder meshoptSquare(const char* indices, const char* mode, const char* extension = "EXT_meshopt_compression") {
+inline GltfBuilder meshoptSquare(const char* indices, const char* mode,
+                                 const char* extension = "EXT_meshopt_compression") {
   GltfBuilder g;
   g.json["extensionsRequired"] = {extension};
-  const int p = g.add("accessors", {{"bufferView", compressedView(g, kPositions, 4, 12, "ATTRIBUTES", "NONE", extension)}, {"componentType", 5126}, {"count", 4}, {"type", "VEC3"}});
-  const int n = g.add("accessors", {{"bufferView", compressedView(g, kNormalsOctahedral, 4, 4, "ATTRIBUTES", "OCTAHEDRAL", extension)}, {"componentType", 5120}, {"normalized", true}, {"count", 4}, {"type", "VEC3"}});
+  const int p =
+      g.add("accessors", {{"bufferView", compressedView(g, kPositions, 4, 12, "ATTRIBUTES", "NONE", extension)},
+                          {"componentType", 5126},
+                          {"count", 4},
+                          {"type", "VEC3"}});
+  const int n = g.add(
+      "accessors", {{"bufferView", compressedView(g, kNormalsOctahedral, 4, 4, "ATTRIBUTES", "OCTAHEDRAL", extension)},
+                    {"componentType", 5120},
+                    {"normalized", true},
+                    {"count", 4},
+                    {"type", "VEC3"}});
   g.json["bufferViews"].back()["byteStride"] = 4;
-  const int i = g.add("accessors", {{"bufferView", compressedView(g, indices, 6, 4, mode, "NONE", extension)}, {"componentType", 5125}, {"count", 6}, {"type", "SCALAR"}});
+  const int i = g.add("accessors", {{"bufferView", compressedView(g, indices, 6, 4, mode, "NONE", extension)},
+                                    {"componentType", 5125},
+                                    {"count", 6},
+                                    {"type", "SCALAR"}});
   g.mesh({{"attributes", {{"POSITION", p}, {"NORMAL", n}}}, {"indices", i}});
-  g.json["buffers"] = {{{"byteLength", g.bin.size()}}, {{"byteLength", 88}, {"extensions", {{extension, {{"fallback", true}}}}}}};
+  g.json["buffers"] = {{{"byteLength", g.bin.size()}},
+                       {{"byteLength", 88}, {"extensions", {{extension, {{"fallback", true}}}}}}};
   return g;
 }
 
@@ -59,10 +79,13 @@ inline GltfBuilder dracoSquare() {
   const auto attribute = [&](int type, const char* shape, bool normalized) {
     return g.add("accessors", {{"componentType", type}, {"count", 4}, {"type", shape}, {"normalized", normalized}});
   };
-  const int p = attribute(5126, "VEC3", false), uv = attribute(5126, "VEC2", false), color = attribute(5121, "VEC4", true);
+  const int p = attribute(5126, "VEC3", false), uv = attribute(5126, "VEC2", false),
+            color = attribute(5121, "VEC4", true);
   g.mesh({{"attributes", {{"POSITION", p}, {"TEXCOORD_0", uv}, {"COLOR_0", color}}},
           {"indices", g.add("accessors", {{"componentType", 5123}, {"count", 6}, {"type", "SCALAR"}})},
-          {"extensions", {{"KHR_draco_mesh_compression", {{"bufferView", view}, {"attributes", {{"POSITION", 0}, {"TEXCOORD_0", 1}, {"COLOR_0", 2}}}}}}}});
+          {"extensions",
+           {{"KHR_draco_mesh_compression",
+             {{"bufferView", view}, {"attributes", {{"POSITION", 0}, {"TEXCOORD_0", 1}, {"COLOR_0", 2}}}}}}}});
   return g;
 }
 
@@ -86,7 +109,8 @@ inline GltfBuilder richSquare() {
                                       {"values", {{"bufferView", valueView}}}};
   const int t = g.accessor<float>("VEC3", {0, 0, 0, 7, 0, 0});
   g.json["meshes"][0]["weights"] = {0.5};
-  g.json["images"] = {{{"uri", "data:image/png;base64,iVBORw0KGgo="}}, {{"bufferView", indexView}, {"mimeType", "image/png"}}};
+  g.json["images"] = {{{"uri", "data:image/png;base64,iVBORw0KGgo="}},
+                      {{"bufferView", indexView}, {"mimeType", "image/png"}}};
   g.json["samplers"] = {{{"wrapS", 33071}, {"magFilter", 9728}}};
   g.json["textures"] = {{{"source", 0}, {"sampler", 0}}, {{"extensions", {{"EXT_texture_webp", {{"source", 1}}}}}}};
   const nlohmann::json transform = {{"KHR_texture_transform", {{"scale", {2, 3}}, {"rotation", 1}, {"texCoord", 1}}}};
@@ -99,7 +123,9 @@ inline GltfBuilder richSquare() {
   g.json["skins"] = {{{"joints", {1}}}};
   g.json["nodes"] = {{{"children", {1, 2, 3}}, {"scale", {1, -2, 1}}},
                      {{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}, {"camera", 0}},
-                     {{"mesh", 0}, {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", t}}}}}}}, {"extras", {{"lumel", {{"scale", 2}}}}}},
+                     {{"mesh", 0},
+                      {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", t}}}}}}},
+                      {"extras", {{"lumel", {{"scale", 2}}}}}},
                      {{"mesh", 0}, {"skin", 0}, {"weights", {1}}}};
   g.json["scenes"] = {{{"nodes", {0}}}};
   g.json["scene"] = 0;
@@ -110,7 +136,10 @@ inline GltfBuilder richSquare() {
 inline std::vector<std::pair<std::string, GltfBuilder>> gltfSamples() {
   GltfBuilder plain;
   plain.square();
-  return {{"plain", plain}, {"rich", richSquare()}, {"meshopt", meshoptSquare(kTriangles, "TRIANGLES")}, {"draco", dracoSquare()}};
+  return {{"plain", plain},
+          {"rich", richSquare()},
+          {"meshopt", meshoptSquare(kTriangles, "TRIANGLES")},
+          {"draco", dracoSquare()}};
 }
 
 }  // namespace lumel

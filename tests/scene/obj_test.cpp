@@ -22,7 +22,9 @@ class Obj : public testing::Test {
     folder_ = scratch();
     fs::create_directories(folder_ / "scene");
   }
-  void write(const std::string& name, const std::string& text) { std::ofstream(folder_ / "scene" / name, std::ios::binary) << text; }
+  void write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / "scene" / name, std::ios::binary) << text;
+  }
   void writePng(const std::string& name, const Image& image) {
     WriteImageOptions options;
     options.format = PixelFormat::U8;
@@ -57,7 +59,8 @@ TEST_F(Obj, SquareWithUvsTurnedToRunDown) {
 
 TEST_F(Obj, ObjectsBecomeInstancesAndMaterialsPrimitives) {
   write("m.mtl", "newmtl red\nKd 1 0 0\nnewmtl glow\nKd 0 0 0\nKe 5 6 7\n");
-  auto scene = load("mtllib m.mtl\n" + kSquare + "o floor\nusemtl red\n" + kFace + "usemtl glow\n" + kFace + "o wall\nusemtl red\n" + kFace + "usemtl none\n" + kFace);
+  auto scene = load("mtllib m.mtl\n" + kSquare + "o floor\nusemtl red\n" + kFace + "usemtl glow\n" + kFace +
+                    "o wall\nusemtl red\n" + kFace + "usemtl none\n" + kFace);
   ASSERT_TRUE(scene) << scene.error().message;
   ASSERT_EQ(scene->instances.size(), 2u);
   EXPECT_EQ(scene->instances[0].name, "floor");
@@ -118,7 +121,8 @@ TEST_F(Obj, SeparateOpacityIsCombinedIntoOneImage) {
   alpha.pixels = {1, 1, 0, 0};
   writePng("c.png", color);
   writePng("a.png", alpha);
-  write("m.mtl", "newmtl leaf\nKd 1 1 1\nmap_Kd c.png\nmap_d a.png\nnewmtl glass\nKd 1 1 1\nd 0.25\nnewmtl tr\nTr 0.75\n");
+  write("m.mtl",
+        "newmtl leaf\nKd 1 1 1\nmap_Kd c.png\nmap_d a.png\nnewmtl glass\nKd 1 1 1\nd 0.25\nnewmtl tr\nTr 0.75\n");
   auto scene = load("mtllib m.mtl\n" + kSquare + "usemtl leaf\n" + kFace);
   ASSERT_TRUE(scene) << scene.error().message;
   const Material& leaf = scene->materials[0];
@@ -143,7 +147,8 @@ TEST_F(Obj, BumpMapsAreNormalMapsOnlyIfTheyLookLikeIt) {
   ASSERT_TRUE(scene) << scene.error().message;
   EXPECT_FALSE(scene->materials[0].normalMap);
   ASSERT_EQ(scene->report.warnings.size(), 1u);
-  EXPECT_TRUE(mentions(scene->report.warnings[0], "material 'h': bump map 'h.png' holds heights, not normals; ignored"));
+  EXPECT_TRUE(
+      mentions(scene->report.warnings[0], "material 'h': bump map 'h.png' holds heights, not normals; ignored"));
   EXPECT_TRUE(scene->materials[1].normalMap);
   EXPECT_EQ(scene->materials[1].normalScale, 0.5f);
   EXPECT_TRUE(scene->materials[2].normalMap);
@@ -166,11 +171,17 @@ TEST_F(Obj, MapOptionsWorkOnUvsThatRunUp) {
 }
 
 TEST_F(Obj, ErrorsNameTheLine) {
-  EXPECT_EQ(errorOf(kSquare + "f 1 2 9\n"), "level.obj: line 9: a face refers to vertex 9, but there are 4; repair the file or export it again");
-  EXPECT_EQ(errorOf(kSquare + "f 1/7 2/2 3/3\n"), "level.obj: line 9: a face refers to texture coordinate 7, but there are 4; repair the file or export it again");
-  EXPECT_EQ(errorOf(kSquare + "f 1 2 0\n"), "level.obj: line 9: a face refers to vertex 0, but there are 4; repair the file or export it again");
-  EXPECT_EQ(errorOf(kSquare + "f 1 2 -5\n"), "level.obj: line 9: a face refers to vertex -5, but there are 4; repair the file or export it again");
-  EXPECT_TRUE(mentions(errorOf(kSquare + "f 1 2 99999999999999999999\n"), "line 9: a face with '99999999999999999999'"));
+  EXPECT_EQ(errorOf(kSquare + "f 1 2 9\n"),
+            "level.obj: line 9: a face refers to vertex 9, but there are 4; repair the file or export it again");
+  EXPECT_EQ(
+      errorOf(kSquare + "f 1/7 2/2 3/3\n"),
+      "level.obj: line 9: a face refers to texture coordinate 7, but there are 4; repair the file or export it again");
+  EXPECT_EQ(errorOf(kSquare + "f 1 2 0\n"),
+            "level.obj: line 9: a face refers to vertex 0, but there are 4; repair the file or export it again");
+  EXPECT_EQ(errorOf(kSquare + "f 1 2 -5\n"),
+            "level.obj: line 9: a face refers to vertex -5, but there are 4; repair the file or export it again");
+  EXPECT_TRUE(
+      mentions(errorOf(kSquare + "f 1 2 99999999999999999999\n"), "line 9: a face with '99999999999999999999'"));
   for (const char* bad : {"nan", "inf", "1e39", "x", "1.#QNAN"})
     EXPECT_TRUE(mentions(errorOf(std::string("# head\nv 0 0 ") + bad + "\n"), "line 2: a vertex with '")) << bad;
   EXPECT_TRUE(mentions(errorOf("v 1 2\n"), "line 1: a vertex with too few numbers"));
@@ -181,7 +192,8 @@ TEST_F(Obj, ErrorsNameTheLine) {
 }
 
 TEST_F(Obj, PathsStayInTheScenesFolder) {
-  EXPECT_TRUE(mentions(errorOf("mtllib ../m.mtl\n" + kSquare + kFace), "level.obj: mtllib: '../m.mtl' leaves the scene's folder"));
+  EXPECT_TRUE(mentions(errorOf("mtllib ../m.mtl\n" + kSquare + kFace),
+                       "level.obj: mtllib: '../m.mtl' leaves the scene's folder"));
   write("m.mtl", "newmtl a\nmap_Kd ../../c.png\n");
   EXPECT_TRUE(mentions(errorOf("mtllib m.mtl\n" + kSquare + kFace), "leaves the scene's folder"));
 }

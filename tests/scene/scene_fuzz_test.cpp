@@ -58,7 +58,8 @@ std::vector<std::uint8_t> damaged(std::vector<std::uint8_t> bytes, Random& rando
 /// Replaces one value somewhere in the JSON (mostly a leaf) by one of the wrong kind or size.
 void damageJson(nlohmann::json& json, Random& random) {
   using Json = nlohmann::json;
-  static const Json kValues = Json::parse(R"([-1, 0, 1, 2, 3, 255, 65535, 2147483647, 4294967295, 4611686018427387904, 1.5,
+  static const Json kValues =
+      Json::parse(R"([-1, 0, 1, 2, 3, 255, 65535, 2147483647, 4294967295, 4611686018427387904, 1.5,
                                              1e300, "x", null, [], {}, true, -2147483648, 5121, 5125])");
   Json* at = &json;
   while (at->is_structured() && !at->empty() && (at == &json || random.below(20) != 0)) {
@@ -85,7 +86,8 @@ TEST(GltfFuzz, DamagedFilesGiveAnErrorOrAScene) {
     for (int i = 0; i < 1400; ++i, ++runs) {
       GltfBuilder changed = sample;
       for (std::size_t times = 1 + random.below(3); times > 0; --times) damageJson(changed.json, random);
-      if (!changed.json.is_object() || (changed.json.contains("buffers") && !changed.json["buffers"].is_array())) continue;
+      if (!changed.json.is_object() || (changed.json.contains("buffers") && !changed.json["buffers"].is_array()))
+        continue;
       loaded += fuzzLoadGltf(changed.glb()) ? 1 : 0;
     }
   }

@@ -96,7 +96,7 @@ TEST(Tangents, WeightsAreAnglesNotAreas) {
 
 TEST(Tangents, DegenerateImagesBorrowFromNeighboursOrFallBack) {
   Primitive p = mirroredPair();
-  p.indices.resize(9);                                   // left square and one triangle of the right
+  p.indices.resize(9);                                     // left square and one triangle of the right
   for (std::size_t v : {4u, 5u}) p.uvSets[0][v] = {1, 1};  // whose image is a line
   makeTangents(p, 0, Mat3(1.0f));
   expectNear(Vec3(p.tangents[p.indices[6]]), {1, 0, 0});  // the shared corner joins the left
@@ -118,7 +118,8 @@ TEST(Tangents, DoNotDependOnTheOrderOfTriangles) {
     makeTangents(p, 0, Mat3(1.0f));
     std::vector<std::array<float, 7>> rows;
     for (std::size_t v = 0; v < p.positions.size(); ++v)
-      rows.push_back({p.positions[v].x, p.positions[v].y, p.positions[v].z, p.tangents[v].x, p.tangents[v].y, p.tangents[v].z, p.tangents[v].w});
+      rows.push_back({p.positions[v].x, p.positions[v].y, p.positions[v].z, p.tangents[v].x, p.tangents[v].y,
+                      p.tangents[v].z, p.tangents[v].w});
     std::sort(rows.begin(), rows.end());
     return rows;
   };
