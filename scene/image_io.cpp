@@ -16,6 +16,8 @@
 #include <system_error>
 
 #include "scene/check.h"
+#include "scene/dds_file.h"
+#include "scene/file_access.h"
 #include "scene/image_type.h"
 
 namespace lumel {
@@ -83,9 +85,9 @@ Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& nam
   loaded.image = Image(spec.width, spec.height, spec.nchannels);
   const std::string noteOfHead = input.geterror();
   const auto stop = [](void* p, float) { return static_cast<const Progress*>(p)->cancelled(); };
-  const bool read = input.read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, loaded.image.pixels.data(),
-                                     OIIO::AutoStride, OIIO::AutoStride, OIIO::AutoStride, stop,
-                                     const_cast<Progress*>(&progress));
+  const bool read =
+      input.read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, loaded.image.pixels.data(), OIIO::AutoStride,
+                       OIIO::AutoStride, OIIO::AutoStride, stop, const_cast<Progress*>(&progress));
   if (progress.cancelled()) return interrupted();
   // Some readers fill in what is missing, note it and go on. What libjpeg skips between markers does no harm.
   const std::string note = input.geterror();
@@ -131,11 +133,23 @@ Expected<LoadedImage> readImage(const std::filesystem::path& file, const Progres
   Head head{};
   read(0, head);
   if (isPng(head) && !isWholePng(std::filesystem::file_size(file, ec), read)) return cutOff(name);
+  std::string note;
+  if (std::equal(head.begin(), head.begin() + 4, "DDS ")) {
+    const auto whole = readFile(file);
+    if (!whole) return whole.error();
+    note = ddsNote(*whole);
+    if (auto wide = readWideDds(*whole, name)) {
+      if (*wide && !note.empty()) (*wide)->metadata["ImageDescription"] = note;
+      return *std::move(wide);
+    }
+  }
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
   auto input = OIIO::ImageInput::open(name, &config);
   if (!input) return unreadable(name, OIIO::geterror());
-  return readOpened(*input, name, head, progress);
+  auto loaded = readOpened(*input, name, head, progress);
+  if (loaded && !note.empty()) loaded->metadata["ImageDescription"] = note;
+  return loaded;
 }
 
 Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std::string& name) {

@@ -45,7 +45,7 @@ std::vector<std::uint8_t> header(int width, int height, std::size_t levels, DdsF
                  ? static_cast<std::uint32_t>(blockBytes(blockFormat(format))) * ((w + 3) / 4) * ((h + 3) / 4)
                  : w * (format == DdsFormat::Rgba8 ? 4u : 8u);
   words[7] = static_cast<std::uint32_t>(levels);
-  std::memcpy(&words[8], note.data(), std::min<std::size_t>(note.size(), 40));
+  std::memcpy(&words[8], note.data(), std::min<std::size_t>(note.size(), 44));
   words[19] = 32;
   words[27] = kCapsTexture | (levels > 1 ? kCapsComplexMipMap : 0);
   if (format == DdsFormat::Rgba8) {

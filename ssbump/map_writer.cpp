@@ -35,6 +35,8 @@ Expected<void> checkFormat(const std::filesystem::path& file, const std::string&
     return usageError(name + ": holds no floats; use --bits 8 or 16, or .exr");
   if (format == PixelFormat::U16 && extension == ".tga")
     return usageError(name + ": TGA holds 8 bits; use .png or --bits 8");
+  if (format == PixelFormat::Float && extension == ".dds")
+    return usageError(name + ": DDS files hold 8 bits, 16 or half; use --bits half, or .exr");
   if (!isFloat && extension == ".exr") return usageError(name + ": EXR holds floats; use --bits half or float");
   return {};
 }
