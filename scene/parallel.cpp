@@ -11,7 +11,37 @@
 
 #include "scene/check.h"
 
+#ifdef LUMEL_THREAD_SANITIZER
+#include <sanitizer/tsan_interface.h>
+
+/// What libraries that are not instrumented do with memory is not judged.
+extern "C" const char* __tsan_default_options() { return "ignore_noninstrumented_modules=1"; }
+#endif
+
 namespace lumel {
+namespace {
+
+/// What the thread sanitizer has to be told, since TBB is not instrumented: a loop's bodies begin after its call and end
+/// before it returns, in no order among each other. Nothing in other builds.
+class LoopOrder {
+ public:
+#ifdef LUMEL_THREAD_SANITIZER
+  void call() { __tsan_release(&begin_); }
+  void bodyBegins() { __tsan_acquire(&begin_); }
+  void bodyEnds() { __tsan_release(&end_); }
+  void callReturns() { __tsan_acquire(&end_); }
+
+ private:
+  char begin_ = 0, end_ = 0;
+#else
+  void call() {}
+  void bodyBegins() {}
+  void bodyEnds() {}
+  void callReturns() {}
+#endif
+};
+
+}  // namespace
 
 void checkFailed(const char* expression, const char* file, int line) {
   std::fprintf(stderr, "%s:%d: check failed: %s\n", file, line, expression);
@@ -21,10 +51,17 @@ void checkFailed(const char* expression, const char* file, int line) {
 void parallelFor(std::size_t count, std::size_t grain, const std::function<void(std::size_t, std::size_t)>& body) {
   LUMEL_CHECK(grain > 0);
   const std::size_t blocks = (count + grain - 1) / grain;
+  LoopOrder order;
+  order.call();
   tbb::parallel_for(
       std::size_t{0}, blocks,
-      [&](std::size_t block) noexcept { body(block * grain, std::min(count, (block + 1) * grain)); },
+      [&](std::size_t block) noexcept {
+        order.bodyBegins();
+        body(block * grain, std::min(count, (block + 1) * grain));
+        order.bodyEnds();
+      },
       tbb::simple_partitioner{});
+  order.callReturns();
 }
 
 struct ThreadLimit::Impl {
