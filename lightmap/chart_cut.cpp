@@ -108,7 +108,6 @@ void cutBand(const HalfEdgeMesh& mesh, ChartMesh& chart) {
       const std::uint32_t b = rank[chart.triangles[t][(k + 1) % 3]];
       if (a != kNone && b != kNone && (a + 1 == b || b + 1 == a)) chart.neighbours[t][k] = -1;
     }
-  chart.points.clear();
   weldCorners(mesh, chart);
 }
 

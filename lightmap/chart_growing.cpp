@@ -146,7 +146,7 @@ class Grower {
         const Vec3d a = areaNormal(mesh_, t);
         const Vec3d b = areaNormal(mesh_, u);
         const double bend = 1 - glm::dot(a, b) / (glm::length(a) * glm::length(b));
-        const double weight = (mesh_.hard[t][k] ? 1.0 : kSmoothCrease) * std::min(thinness(t), thinness(u));
+        const double weight = (mesh_.isHard(t, k) ? 1.0 : kSmoothCrease) * std::min(thinness(t), thinness(u));
         border.absorb({static_cast<float>(length), static_cast<float>(length * weight * std::max(0.0, bend))});
       }
     }

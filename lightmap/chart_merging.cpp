@@ -89,7 +89,7 @@ class PartMerger {
     const double bend = 1 - glm::dot(n, m) / (glm::length(n) * glm::length(m));
     const double length = sheet_.length(edge);
     border.length += length;
-    border.crease += length * std::max(0.0, bend) * (mesh_.hard[edge.triangle][edge.k] ? 1.0 : kSmoothCrease);
+    border.crease += length * std::max(0.0, bend) * (mesh_.isHard(edge.triangle, edge.k) ? 1.0 : kSmoothCrease);
   }
 
   double cost(std::uint32_t index) const {

@@ -51,15 +51,16 @@ void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart) {
   }
   std::vector<std::uint32_t> vertexOf(3 * count, 0);
   chart.triangles.resize(count);
+  chart.points = {{}, mesh.points.toTexels};
   for (std::uint32_t i = 0; i < 3 * count; ++i) {
     const std::uint32_t root = findRoot(corner, i);
     if (root == i) {
       vertexOf[i] = static_cast<std::uint32_t>(chart.points.size());
-      chart.points.push_back(mesh.points[mesh.triangles[chart.meshTriangles[i / 3]][i % 3]]);
+      chart.points.positions.push_back(mesh.points.positions[mesh.triangles[chart.meshTriangles[i / 3]][i % 3]]);
     }
     chart.triangles[i / 3][i % 3] = vertexOf[root];
   }
-  chart.points.shrink_to_fit();
+  chart.points.positions.shrink_to_fit();
 }
 
 TriangleSteps stepsFrom(const ChartMesh& chart, std::uint32_t seed) {

@@ -13,7 +13,7 @@ namespace lumel {
 
 /// A connected piece of a HalfEdgeMesh. Points of the mesh where the piece merely touches itself are several vertices.
 struct ChartMesh {
-  std::vector<Vec3d> points;
+  TexelPoints points;
   std::vector<std::array<std::uint32_t, 3>> triangles;  // into `points`
   std::vector<std::array<std::int32_t, 3>> neighbours;  // of this chart, beyond edge (k, k + 1); -1 at its border
   std::vector<std::uint32_t> meshTriangles;             // per triangle: of the HalfEdgeMesh, ascending

@@ -387,6 +387,7 @@ void ChartSheet::replace(std::uint32_t into, std::uint32_t from, const FlatChart
 
 FlatChart ChartSheet::take(std::uint32_t index) const {
   FlatChart flat;
+  flat.mesh.points.toTexels = mesh_.points.toTexels;
   flat.mesh.meshTriangles = charts_[index].triangles;
   std::sort(flat.mesh.meshTriangles.begin(), flat.mesh.meshTriangles.end());
   std::unordered_map<std::uint32_t, std::uint32_t> vertexOf;  // looked up only
@@ -398,7 +399,7 @@ FlatChart ChartSheet::take(std::uint32_t index) const {
       const std::uint32_t vertex = vertexAt(t, k);
       const auto [place, isNew] = vertexOf.try_emplace(vertex, static_cast<std::uint32_t>(flat.mesh.points.size()));
       if (isNew) {
-        flat.mesh.points.push_back(mesh_.points[mesh_.triangles[t][k]]);
+        flat.mesh.points.positions.push_back(mesh_.points.positions[mesh_.triangles[t][k]]);
         flat.uvs.push_back(uvs_[vertex]);
       }
       triangle[k] = place->second;

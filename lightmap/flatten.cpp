@@ -122,7 +122,7 @@ std::vector<Vec2d> unroll(const ChartMesh& chart) {
 /// Local/global iterations: rotations per triangle, then one solve with a matrix that is factored once.
 class RigidRelaxation {
  public:
-  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), solver_(chart.points, chart.triangles) { factorize(); }
+  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), solver_(chart.points.all(), chart.triangles) { factorize(); }
 
   /// Iteratively reweighted towards a fourth power of the error: triangles beyond `limit` pull harder, so that the
   /// distortion spreads from where it is worst.

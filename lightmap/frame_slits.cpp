@@ -29,6 +29,7 @@ bool findClosed(const FlatChart& chart, const FrameBreak& edge, double gap, Slit
 /// The part of the chart for which keep[triangle] == which, with the UVs that it has.
 FlatChart part(const FlatChart& whole, const std::vector<bool>& keep, bool which) {
   FlatChart result;
+  result.mesh.points.toTexels = whole.mesh.points.toTexels;
   std::vector<std::int32_t> index(whole.mesh.triangles.size(), -1);
   std::vector<std::int64_t> vertexOf(whole.uvs.size(), -1);
   std::int32_t count = 0;
@@ -43,7 +44,7 @@ FlatChart part(const FlatChart& whole, const std::vector<bool>& keep, bool which
       if (vertexOf[old] < 0) {
         vertexOf[old] = static_cast<std::int64_t>(result.uvs.size());
         result.uvs.push_back(whole.uvs[old]);
-        result.mesh.points.push_back(whole.mesh.points[old]);
+        result.mesh.points.positions.push_back(whole.mesh.points.positions[old]);
       }
       triangle[k] = static_cast<std::uint32_t>(vertexOf[old]);
       const std::int32_t n = whole.mesh.neighbours[t][k];

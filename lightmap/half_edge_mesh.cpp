@@ -32,8 +32,8 @@ std::uint32_t nextCorner(std::uint32_t corner) { return corner % 3 == 2 ? corner
 
 class Builder {
  public:
-  explicit Builder(TriangleSoup&& soup) : soup_(std::move(soup)), welded_(weldPositions(soup_.positions)) {
-    release(soup_.positions);
+  explicit Builder(TriangleSoup&& soup) : soup_(std::move(soup)), welded_(weldPositions(soup_.points.positions)) {
+    mesh_.points.toTexels = soup_.points.toTexels;
   }
 
   HalfEdgeMesh build() {
@@ -104,7 +104,9 @@ class Builder {
     }
     opposite_[a] = static_cast<std::int32_t>(b);
     opposite_[b] = static_cast<std::int32_t>(a);
-    mesh_.hard[a / 3][a % 3] = mesh_.hard[b / 3][b % 3] = isHard;
+    if (!isHard) return;
+    mesh_.hardEdges[a / 3] |= static_cast<std::uint8_t>(1u << a % 3);
+    mesh_.hardEdges[b / 3] |= static_cast<std::uint8_t>(1u << b % 3);
   }
 
   void pairSides() {
@@ -119,7 +121,7 @@ class Builder {
       return std::tie(a.low, a.high, a.corner) < std::tie(b.low, b.high, b.corner);
     });
     opposite_.assign(corners, -1);
-    mesh_.hard.assign(corners / 3, {false, false, false});
+    mesh_.hardEdges.assign(corners / 3, 0);
     for (std::size_t first = 0, last; first < sides.size(); first = last) {
       for (last = first + 1; last < sides.size() && sides[last].low == sides[first].low && sides[last].high == sides[first].high;)
         ++last;
@@ -179,12 +181,12 @@ class Builder {
       int& vertex = vertexOfFan[findRoot(fan_, corner)];
       if (vertex < 0) {
         vertex = mesh.add_vertex({}).idx();
-        mesh_.points.push_back(soup_.points[vertexAt(corner)]);
+        mesh_.points.positions.push_back(soup_.points.positions[vertexAt(corner)]);
       }
       mesh_.triangles[corner / 3][corner % 3] = static_cast<std::uint32_t>(vertex);
     }
-    mesh_.points.shrink_to_fit();
-    release(soup_.points, soup_.indices, fan_, vertexOfFan);
+    mesh_.points.positions.shrink_to_fit();
+    release(soup_.points.positions, soup_.indices, fan_, vertexOfFan);
     std::vector<std::uint32_t> triangleOfFace;
     std::vector<std::uint32_t> misfits;
     for (const std::uint32_t t : sheetOrder()) {
@@ -264,6 +266,12 @@ class Builder {
 };
 
 }  // namespace
+
+std::vector<Vec3d> TexelPoints::all() const {
+  std::vector<Vec3d> points(size());
+  for (std::size_t i = 0; i < size(); ++i) points[i] = (*this)[i];
+  return points;
+}
 
 std::uint32_t HalfEdgeMesh::sourceOf(std::uint32_t triangle) const {
   // leftOut[i] - i kept triangles come before the one left out.

@@ -55,18 +55,18 @@ Vec3 unitOr(const Vec3& v, const Vec3& otherwise) {
 
 TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texelsPerMeter, TriangleSources& source) {
   TriangleSoup soup;
-  const Mat3d linear = Mat3d(Mat3(instance.worldFromObject)) * densityOf(instance, texelsPerMeter);
-  const bool mirrors = glm::determinant(linear) < 0;
+  soup.points.toTexels = Mat3d(Mat3(instance.worldFromObject)) * densityOf(instance, texelsPerMeter);
+  const bool mirrors = glm::determinant(soup.points.toTexels) < 0;
   const Mat3 objectFromWorld = glm::inverse(Mat3(instance.worldFromObject));
   const std::vector<Primitive>& primitives = scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives;
   for (std::size_t p = 0; p < primitives.size(); ++p) {
     const Primitive& primitive = primitives[p];
     if (!receivesLight(scene, instance, primitive)) continue;
-    const auto base = static_cast<std::uint32_t>(soup.positions.size());
-    soup.positions.insert(soup.positions.end(), primitive.positions.begin(), primitive.positions.end());
+    std::vector<Vec3>& positions = soup.points.positions;
+    const auto base = static_cast<std::uint32_t>(positions.size());
+    positions.insert(positions.end(), primitive.positions.begin(), primitive.positions.end());
     for (const Vec3& n : primitive.normals) soup.normals.push_back(unitOr(n * objectFromWorld, n));
-    for (const Vec3& position : primitive.positions) soup.points.push_back(linear * Vec3d(position));
-    soup.frames.resize(soup.positions.size(), Vec4(0.0f));
+    soup.frames.resize(positions.size(), Vec4(0.0f));
     if (hasMaterialFrame(primitive))  // as they will be baked: at right angles to the normal
       for (std::size_t i = 0; i < primitive.positions.size(); ++i)
         soup.frames[base + i] = Vec4(frameFromTangent(primitive.normals[i], primitive.tangents[i]).t, primitive.tangents[i].w < 0 ? -1.0f : 1.0f);

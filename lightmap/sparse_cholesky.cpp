@@ -16,9 +16,28 @@ constexpr double kMostSteps = 32767.0;
 
 }  // namespace
 
+/// A front's matrix is held as its panel, the columns of the points that it eliminates, and its update, what is then
+/// left for the points beyond. As one square it would be twice as large.
 struct SparseCholesky::Workspace {
-  std::vector<double> front;
+  Eigen::MatrixXd panel, product;
   std::vector<std::uint32_t> place;
+};
+
+/// The lower triangle of a symmetric matrix, by columns.
+class SparseCholesky::Update {
+ public:
+  void resize(std::size_t size) {
+    size_ = size;
+    values_ = std::make_unique<double[]>(size * (size + 1) / 2);
+  }
+  void clear() { values_.reset(); }
+  /// The diagonal's entry, followed by those below it.
+  double* column(std::size_t j) const { return values_.get() + j * size_ - j * (j - 1) / 2; }
+  double& at(std::size_t i, std::size_t j) const { return column(j)[i - j]; }
+
+ private:
+  std::unique_ptr<double[]> values_;
+  std::size_t size_ = 0;
 };
 
 SparseCholesky::SparseCholesky(std::span<const Vec3d> points, std::span<const std::array<std::uint32_t, 3>> triangles)
@@ -26,6 +45,7 @@ SparseCholesky::SparseCholesky(std::span<const Vec3d> points, std::span<const st
   const Dissection dissection = nestedDissection(points, triangles);
   for (std::uint32_t i = 0; i < dissection.order.size(); ++i) rank_[dissection.order[i]] = i;
   std::vector<std::uint32_t> frontOf(points.size());
+  fronts_.reserve(dissection.nodes.size());
   for (const DissectionNode& node : dissection.nodes) {
     Front front;
     front.begin = node.begin;
@@ -96,62 +116,76 @@ std::uint32_t SparseCholesky::localRow(const Front& front, std::uint32_t rank) c
   return front.end - front.begin + static_cast<std::uint32_t>(std::lower_bound(first, first + front.rows, rank) - first);
 }
 
-bool SparseCholesky::eliminate(std::uint32_t index, const std::function<std::array<double, 3>(std::size_t)>& weights, Workspace& work,
-                               std::vector<std::vector<double>>& updates) {
+/// The front's matrix before any of its points is gone.
+void SparseCholesky::assemble(std::uint32_t index, const Weights& weights, Workspace& work, std::vector<Update>& updates) const {
   const Front& front = fronts_[index];
-  const auto pivots = static_cast<Eigen::Index>(front.end - front.begin);
-  const auto below = static_cast<Eigen::Index>(front.rows);
-  const Eigen::Index size = pivots + below;
-  const auto entries = static_cast<std::size_t>(size * size);
-  if (work.front.capacity() < entries) work.front = std::vector<double>();  // or both would be there for a moment
-  work.front.assign(entries, 0.0);
-  Eigen::Map<Eigen::MatrixXd> matrix(work.front.data(), size, size);  // its lower triangle
+  const std::uint32_t pivots = front.end - front.begin;
+  work.panel.setZero(pivots + front.rows, pivots);
+  Update& update = updates[index];
+  update.resize(front.rows);
+  const auto entry = [&](std::uint32_t a, std::uint32_t b) -> double& {
+    const auto [column, row] = std::minmax(a, b);
+    return column < pivots ? work.panel(row, column) : update.at(row - pivots, column - pivots);
+  };
   for (std::uint32_t i = front.firstTriangle; i < front.firstTriangle + front.triangles; ++i) {
     const std::array<double, 3> w = weights(order_[i]);
     std::array<std::uint32_t, 3> row = ranksOf(order_[i]);
     for (std::uint32_t& r : row) r = localRow(front, r);
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t a = row[k], b = row[(k + 1) % 3];
-      matrix(a, a) += w[k];
-      matrix(b, b) += w[k];
-      matrix(std::max(a, b), std::min(a, b)) -= w[k];
+      entry(a, a) += w[k];
+      entry(b, b) += w[k];
+      entry(a, b) -= w[k];
     }
   }
-  if (pivots > 0 && front.end == rank_.size()) matrix(pivots - 1, pivots - 1) += 1;
+  if (pivots > 0 && front.end == rank_.size()) work.panel(pivots - 1, pivots - 1) += 1;
   for (const std::int32_t child : {front.left, front.right}) {
     if (child < 0) continue;
     const Front& from = fronts_[static_cast<std::size_t>(child)];
-    std::vector<double>& update = updates[static_cast<std::size_t>(child)];
+    Update& passedOn = updates[static_cast<std::size_t>(child)];
     work.place.clear();
     for (std::uint32_t i = 0; i < from.rows; ++i) work.place.push_back(localRow(front, rows_[from.firstRow + i]));
-    const double* value = update.data();
-    for (std::size_t j = 0; j < from.rows; ++j)
-      for (std::size_t i = j; i < from.rows; ++i) matrix(work.place[i], work.place[j]) += *value++;
-    update = std::vector<double>();  // gives its memory back
+    for (std::size_t j = 0; j < from.rows; ++j) {
+      const double* value = passedOn.column(j);
+      const std::uint32_t at = work.place[j];  // ascending
+      double* column = at < pivots ? &work.panel(at, at) : update.column(at - pivots);
+      for (std::size_t i = j; i < from.rows; ++i) column[work.place[i] - at] += *value++;
+    }
+    passedOn.clear();
   }
-  if (pivots > 0) {
-    Eigen::Ref<Eigen::MatrixXd> corner = matrix.topLeftCorner(pivots, pivots);
-    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factored(corner);
-    if (factored.info() != Eigen::Success || !corner.diagonal().allFinite()) return false;
-    auto side = matrix.bottomLeftCorner(below, pivots);
-    auto rest = matrix.bottomRightCorner(below, below);
-    corner.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(side);
-    rest.selfadjointView<Eigen::Lower>().rankUpdate(side, -1.0);
-    store(front, matrix.data());
+}
+
+bool SparseCholesky::eliminate(std::uint32_t index, const Weights& weights, Workspace& work, std::vector<Update>& updates) {
+  const Front& front = fronts_[index];
+  assemble(index, weights, work, updates);
+  const Eigen::Index pivots = work.panel.cols();
+  if (pivots == 0) return true;
+  Eigen::Ref<Eigen::MatrixXd> corner = work.panel.topRows(pivots);
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factored(corner);
+  if (factored.info() != Eigen::Success || !corner.diagonal().allFinite()) return false;
+  const auto below = static_cast<Eigen::Index>(front.rows);
+  auto side = work.panel.bottomRows(below);
+  corner.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(side);
+  constexpr Eigen::Index kColumns = 64;  // at a time
+  for (Eigen::Index first = 0; first < below; first += kColumns) {
+    const Eigen::Index columns = std::min(kColumns, below - first);
+    work.product.noalias() = side.bottomRows(below - first) * side.middleRows(first, columns).transpose();
+    for (Eigen::Index j = 0; j < columns; ++j) {
+      Eigen::Map<Eigen::VectorXd> column(updates[index].column(static_cast<std::size_t>(first + j)), below - first - j);
+      column -= work.product.col(j).tail(below - first - j);
+    }
   }
-  updates[index].reserve(front.rows * (front.rows + std::size_t{1}) / 2);
-  for (Eigen::Index j = pivots; j < size; ++j)
-    updates[index].insert(updates[index].end(), &matrix(j, j), &matrix(0, j) + size);
+  store(front, work.panel.data());
   return true;
 }
 
-/// `matrix`: by columns; those of the front's points are done.
-void SparseCholesky::store(const Front& front, const double* matrix) {
+/// `panel`: of a front whose points are eliminated, by columns.
+void SparseCholesky::store(const Front& front, const double* panel) {
   const std::size_t pivots = front.end - front.begin;
   const std::size_t size = pivots + front.rows;
   std::int16_t* value = values_.get() + front.values;
   for (std::size_t j = 0; j < pivots; ++j) {
-    const double* column = matrix + j * size;
+    const double* column = panel + j * size;
     double largest = 0;
     for (std::size_t i = j; i < size; ++i) largest = std::max(largest, std::abs(column[i]));
     const float step = static_cast<float>(largest / kMostSteps);
@@ -162,8 +196,8 @@ void SparseCholesky::store(const Front& front, const double* matrix) {
   }
 }
 
-bool SparseCholesky::factorize(const std::function<std::array<double, 3>(std::size_t)>& weights) {
-  std::vector<std::vector<double>> updates(fronts_.size());
+bool SparseCholesky::factorize(const Weights& weights) {
+  std::vector<Update> updates(fronts_.size());
   std::atomic<bool> failed = false;
   const auto run = [&](std::uint32_t first, std::uint32_t last, Workspace& work) {
     for (std::uint32_t i = first; i <= last && !failed; ++i)

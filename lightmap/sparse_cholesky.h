@@ -15,12 +15,15 @@ namespace lumel {
 /// digits; who wants more solves for what is still missing.
 class SparseCholesky {
  public:
+  /// Of triangle t's sides (k, k + 1).
+  using Weights = std::function<std::array<double, 3>(std::size_t t)>;
+
   /// The triangles must outlive it.
   SparseCholesky(std::span<const Vec3d> points, std::span<const std::array<std::uint32_t, 3>> triangles);
 
-  /// `weights(t)`: of triangle t's sides (k, k + 1); parallel over parts of the mesh, the same for any thread count.
+  /// Parallel over parts of the mesh, the same for any thread count.
   /// False: the matrix is not positive definite (the triangles do not hang together).
-  bool factorize(const std::function<std::array<double, 3>(std::size_t)>& weights);
+  bool factorize(const Weights& weights);
 
   /// A point's place in the order of elimination.
   std::uint32_t rankOf(std::size_t point) const { return rank_[point]; }
@@ -38,12 +41,13 @@ class SparseCholesky {
     std::size_t values = 0;                      // into values_: its columns, each from the diagonal down
   };
   struct Workspace;
+  class Update;
 
   void analyse();
-  bool eliminate(std::uint32_t front, const std::function<std::array<double, 3>(std::size_t)>& weights, Workspace& work,
-                 std::vector<std::vector<double>>& updates);
+  void assemble(std::uint32_t front, const Weights& weights, Workspace& work, std::vector<Update>& updates) const;
+  bool eliminate(std::uint32_t front, const Weights& weights, Workspace& work, std::vector<Update>& updates);
   std::array<std::uint32_t, 3> ranksOf(std::uint32_t triangle) const;
-  void store(const Front& front, const double* matrix);
+  void store(const Front& front, const double* panel);
   std::uint32_t localRow(const Front& front, std::uint32_t rank) const;
 
   std::span<const std::array<std::uint32_t, 3>> triangles_;

@@ -9,12 +9,12 @@ namespace lumel {
 namespace {
 
 /// A mesh of points in texels, joined at edges with equal point numbers.
-HalfEdgeMesh meshOf(std::vector<Vec3d> points, std::vector<std::array<std::uint32_t, 3>> triangles) {
+HalfEdgeMesh meshOf(std::vector<Vec3> points, std::vector<std::array<std::uint32_t, 3>> triangles) {
   HalfEdgeMesh mesh;
-  mesh.points = std::move(points);
+  mesh.points.positions = std::move(points);
   mesh.triangles = std::move(triangles);
   mesh.neighbours.assign(mesh.size(), {-1, -1, -1});
-  mesh.hard.assign(mesh.size(), {false, false, false});
+  mesh.hardEdges.assign(mesh.size(), 0);
   for (std::uint32_t t = 0; t < mesh.size(); ++t)
     for (std::uint32_t u = 0; u < mesh.size(); ++u)
       for (std::size_t i = 0; i < 3; ++i)
@@ -28,7 +28,7 @@ HalfEdgeMesh meshOf(std::vector<Vec3d> points, std::vector<std::array<std::uint3
 FlatChart flatChart(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> triangles) {
   FlatChart flat;
   flat.mesh = makeChartMesh(mesh, std::move(triangles));
-  for (const Vec3d& p : flat.mesh.points) flat.uvs.push_back(Vec2d(p));
+  for (const Vec3d& p : flat.mesh.points.all()) flat.uvs.push_back(Vec2d(p));
   return flat;
 }
 
