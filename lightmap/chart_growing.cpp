@@ -49,7 +49,7 @@ double smallestEigenvalue(const std::array<double, 6>& m) {
 class Grower {
  public:
   Grower(const HalfEdgeMesh& mesh, const GrowOptions& options)
-      : mesh_(mesh), options_(options), place_(mesh.size(), kSingle), borders_(mesh.size(), 3 * mesh.size() / 2) {}
+      : mesh_(mesh), options_(options), points_(mesh.points.all()), place_(mesh.size(), kSingle), borders_(mesh.size(), 3 * mesh.size() / 2) {}
 
   MergeTree grow() {
     tree_.triangleCount = mesh_.size();
@@ -88,9 +88,15 @@ class Grower {
     return a;
   }
 
+  /// Twice the triangle's area long.
+  Vec3d normalOf(std::uint32_t triangle) const {
+    const auto& v = mesh_.triangles[triangle];
+    return glm::cross(points_[v[1]] - points_[v[0]], points_[v[2]] - points_[v[0]]);
+  }
+
   double edgeLength(std::uint32_t triangle, std::size_t k) const {
     const auto& v = mesh_.triangles[triangle];
-    return glm::length(mesh_.points[v[(k + 1) % 3]] - mesh_.points[v[k]]);
+    return glm::length(points_[v[(k + 1) % 3]] - points_[v[k]]);
   }
 
   /// As the border of two triangles has it.
@@ -104,10 +110,10 @@ class Grower {
 
   Region single(std::uint32_t triangle) const {
     Region r;
-    r.normals = NormalMoments(areaNormal(mesh_, triangle));
+    r.normals = NormalMoments(normalOf(triangle));
     const auto& v = mesh_.triangles[triangle];
-    r.low = Vec3(glm::min(mesh_.points[v[0]], glm::min(mesh_.points[v[1]], mesh_.points[v[2]])));
-    r.high = Vec3(glm::max(mesh_.points[v[0]], glm::max(mesh_.points[v[1]], mesh_.points[v[2]])));
+    r.low = Vec3(glm::min(points_[v[0]], glm::min(points_[v[1]], points_[v[2]])));
+    r.high = Vec3(glm::max(points_[v[0]], glm::max(points_[v[1]], points_[v[2]])));
     for (std::size_t k = 0; k < 3; ++k) r.perimeter += edgeLength(triangle, k);
     r.node = triangle;
     return r;
@@ -129,24 +135,25 @@ class Grower {
     const auto& v = mesh_.triangles[triangle];
     double longest2 = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3d e = mesh_.points[v[(k + 1) % 3]] - mesh_.points[v[k]];
+      const Vec3d e = points_[v[(k + 1) % 3]] - points_[v[k]];
       longest2 = std::max(longest2, glm::dot(e, e));
     }
-    return std::min(1.0, glm::length(areaNormal(mesh_, triangle)) / std::sqrt(longest2) / kThinTexels);
+    return std::min(1.0, glm::length(normalOf(triangle)) / std::sqrt(longest2) / kThinTexels);
   }
 
   void makeBorders() {
     for (std::uint32_t t = 0; t < mesh_.size(); ++t) {
+      const Vec3d a = normalOf(t);
+      const double ownThinness = thinness(t);
       for (std::size_t k = 0; k < 3; ++k) {
         const std::int32_t other = mesh_.neighbours[t][k];
         if (other <= static_cast<std::int32_t>(t)) continue;
         const auto u = static_cast<std::uint32_t>(other);
         Border& border = borders_[borders_.between(t, u)];
         const double length = edgeLength(t, k);
-        const Vec3d a = areaNormal(mesh_, t);
-        const Vec3d b = areaNormal(mesh_, u);
+        const Vec3d b = normalOf(u);
         const double bend = 1 - glm::dot(a, b) / (glm::length(a) * glm::length(b));
-        const double weight = (mesh_.isHard(t, k) ? 1.0 : kSmoothCrease) * std::min(thinness(t), thinness(u));
+        const double weight = (mesh_.isHard(t, k) ? 1.0 : kSmoothCrease) * std::min(ownThinness, thinness(u));
         border.absorb({static_cast<float>(length), static_cast<float>(length * weight * std::max(0.0, bend))});
       }
     }
@@ -211,6 +218,7 @@ class Grower {
 
   const HalfEdgeMesh& mesh_;
   const GrowOptions& options_;
+  std::vector<Vec3d> points_;
   std::vector<std::uint32_t> place_;  // per region: in kept_, or kSingle, or kPair + its merge
   std::deque<Region> kept_;
   std::vector<std::uint32_t> free_;  // places in kept_

@@ -78,18 +78,6 @@ TriangleSteps stepsFrom(const ChartMesh& chart, std::uint32_t seed) {
   return steps;
 }
 
-FlatTriangle layFlat(const std::array<Vec3d, 3>& corners) {
-  const Vec3d a = corners[1] - corners[0];
-  const Vec3d b = corners[2] - corners[0];
-  const double length = glm::length(a);
-  return {length, glm::dot(a, b) / length, glm::length(glm::cross(a, b)) / length};
-}
-
-FlatTriangle layFlat(const ChartMesh& chart, std::size_t triangle) {
-  const auto& v = chart.triangles[triangle];
-  return layFlat({chart.points[v[0]], chart.points[v[1]], chart.points[v[2]]});
-}
-
 double shortestHeight(const FlatTriangle& f) {
   return f.x1 * f.y2 / std::max({f.x1, std::hypot(f.x2, f.y2), std::hypot(f.x2 - f.x1, f.y2)});
 }

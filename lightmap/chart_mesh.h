@@ -36,8 +36,16 @@ TriangleSteps stepsFrom(const ChartMesh& chart, std::uint32_t seed);
 struct FlatTriangle {
   double x1 = 0, x2 = 0, y2 = 0;
 };
-FlatTriangle layFlat(const std::array<Vec3d, 3>& corners);
-FlatTriangle layFlat(const ChartMesh& chart, std::size_t triangle);
+inline FlatTriangle layFlat(const std::array<Vec3d, 3>& corners) {
+  const Vec3d a = corners[1] - corners[0];
+  const Vec3d b = corners[2] - corners[0];
+  const double length = glm::length(a);
+  return {length, glm::dot(a, b) / length, glm::length(glm::cross(a, b)) / length};
+}
+inline FlatTriangle layFlat(const ChartMesh& chart, std::size_t triangle) {
+  const auto& v = chart.triangles[triangle];
+  return layFlat({chart.points[v[0]], chart.points[v[1]], chart.points[v[2]]});
+}
 double shortestHeight(const FlatTriangle& triangle);
 
 /// Triangles thinner than this (texels) may stand askew or collapse: nothing of them shows.
