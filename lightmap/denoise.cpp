@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "scene/check.h"
+#include "scene/each_cpu.h"
 #include "scene/parallel.h"
 
 namespace lumel {
@@ -188,7 +189,7 @@ class Agreement {
 /// Adds to every texel of the tile the two that lie (dx, dy) and (-dx, -dy) from it, as far as the patches of both
 /// agree with its own. Alone, a texel on one side would bend a slope of light, at the borders of charts most of all; in
 /// pairs slopes cancel.
-void addPair(const Tile& tile, std::ptrdiff_t dx, std::ptrdiff_t dy, std::size_t width, Sums& sums) {
+LUMEL_FOR_EACH_CPU void addPair(const Tile& tile, std::ptrdiff_t dx, std::ptrdiff_t dy, std::size_t width, Sums& sums) {
   const std::ptrdiff_t shift = dy * static_cast<std::ptrdiff_t>(tile.stride) + dx;
   Agreement ahead(tile, shift, width);
   Agreement behind(tile, -shift, width);
