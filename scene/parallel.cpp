@@ -3,6 +3,7 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -53,14 +54,17 @@ void parallelFor(std::size_t count, std::size_t grain, const std::function<void(
   const std::size_t blocks = (count + grain - 1) / grain;
   LoopOrder order;
   order.call();
-  tbb::parallel_for(
-      std::size_t{0}, blocks,
-      [&](std::size_t block) noexcept {
-        order.bodyBegins();
-        body(block * grain, std::min(count, (block + 1) * grain));
-        order.bodyEnds();
-      },
-      tbb::simple_partitioner{});
+  // Isolated: who waits for the end of a loop inside of another one takes nothing up from the outer, which might last.
+  tbb::this_task_arena::isolate([&] {
+    tbb::parallel_for(
+        std::size_t{0}, blocks,
+        [&](std::size_t block) noexcept {
+          order.bodyBegins();
+          body(block * grain, std::min(count, (block + 1) * grain));
+          order.bodyEnds();
+        },
+        tbb::simple_partitioner{});
+  });
   order.callReturns();
 }
 
