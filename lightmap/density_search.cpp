@@ -52,7 +52,7 @@ class Placer {
     constexpr int kMostAttempts = 40;
     std::optional<ChartPlaces> best;
     double fits = 0, tooLarge = 0;
-    double scale = std::min(1.0, mostScale);
+    double scale = std::min(kStep, mostScale);  // the charts' own density, half of a page, nearly always fits
     for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
       Expected<ChartPlaces> places = placeAt(scale, true);
       if (places) {
