@@ -86,21 +86,31 @@ class Unwrapper {
     const double all = static_cast<double>(chart.mesh.triangles.size());
     const double share = static_cast<double>(tree_.trianglesBelow(children[0]).size()) / all;
     if (std::min(share, 1 - share) >= kFairShare) {
-      for (const std::uint32_t child : children) flattenNode(child, charts);
+      flattenBoth(charts, [&](std::size_t i, std::vector<FlatChart>& found) { flattenNode(children[i], found); });
     } else {
       flattenHalves(chart.mesh, charts);
     }
   }
 
   void flattenHalves(const ChartMesh& whole, std::vector<FlatChart>& charts) const {
-    for (std::vector<std::uint32_t>& half : halve(whole)) {
-      const bool single = half.size() == 1;
+    std::array<std::vector<std::uint32_t>, 2> halves = halve(whole);
+    flattenBoth(charts, [&](std::size_t i, std::vector<FlatChart>& found) {
+      const bool single = halves[i].size() == 1;
       FlatChart chart;
-      if (tryFlatten(std::move(half), chart) || single)
-        charts.push_back(std::move(chart));
+      if (tryFlatten(std::move(halves[i]), chart) || single)
+        found.push_back(std::move(chart));
       else
-        flattenHalves(chart.mesh, charts);
-    }
+        flattenHalves(chart.mesh, found);
+    });
+  }
+
+  /// Calls part(0, charts) and part(1, charts) side by side: a large region that falls apart would hold up all others.
+  template <class Part>
+  static void flattenBoth(std::vector<FlatChart>& charts, Part part) {
+    std::array<std::vector<FlatChart>, 2> found;
+    parallelFor(2, 1, [&](std::size_t i, std::size_t) { part(i, found[i]); });
+    for (std::vector<FlatChart>& half : found)
+      for (FlatChart& chart : half) charts.push_back(std::move(chart));
   }
 
   const HalfEdgeMesh& mesh_;
