@@ -8,13 +8,14 @@ namespace {
 
 using namespace testing_scene;
 
-/// A floor of 4 x 4 texels of 1 m under an even sky, black like all that stands on it: light is what of the sky is
-/// seen.
-TestScene blackFloor() {
+/// A floor of 4 x 4 (or more) texels of 1 m under an even sky, black like all that stands on it: light is what of the
+/// sky is seen.
+TestScene blackFloor(int texels = 4) {
   TestScene test;
   test.integrator = Integrator::Gather;
   test.addMaterial(Vec3(0.0f));
-  test.addRectangle({0, 0, 4}, {4, 0, 0}, {0, 0, -4}, {.material = 1, .texels = 4});
+  const auto side = static_cast<float>(texels);
+  test.addRectangle({0, 0, side}, {side, 0, 0}, {0, 0, -side}, {.material = 1, .texels = texels});
   test.scene.environment.color = Vec3(1.0f);
   return test;
 }
@@ -68,6 +69,19 @@ TEST(Inside, TheOpenPartOfATexelIsAsBrightAsTheFloorBesideIt) {
       EXPECT_NEAR(light, 1.0, samples < 100 ? 0.03 : 0.015) << covered << " covered, " << samples << " samples";
     }
   }
+}
+
+// The same of grey: a block over half of a column and all further ones. Its points inside see its walls and floor,
+// which must not hold the light of the floor outside: the column is darker for the wall on it, not brighter.
+TEST(Inside, WhatABlockStandsOnDoesNotShineInIt) {
+  TestScene test = blackFloor(16);
+  test.scene.materials.back().baseColor = Vec4(Vec3(0.8f), 1.0f);
+  addBox(test, 4.5f, 16.0f, 0.0f, 16.0f, 6.0f);
+  const BakeResult gather = test.bake({.samples = 256});
+  const Floor open = columns(gather, 0, 1), beside = columns(gather, 4, 5);
+  EXPECT_NEAR(beside.validity, 0.5, 0.1);
+  EXPECT_LT(beside.light, open.light);
+  EXPECT_GT(beside.light, 0.7 * open.light);
 }
 
 // Backs in view are seen, and nothing else: a lid high above the floor turns its back to it, and the texels look at it
