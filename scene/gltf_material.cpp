@@ -115,6 +115,10 @@ Material MaterialLoader::convert(const tinygltf::Material& source) {
   if (const auto* strength = findExtension(source.extensions, "KHR_materials_emissive_strength"))
     material.emission *= toFloat(valueNumber(*strength, "emissiveStrength", 1.0));
   if (const auto* specular = findExtension(source.extensions, "KHR_materials_pbrSpecularGlossiness")) {
+    // It takes the place of the other model, whose members are for programs that do not know it.
+    material.baseColor = Vec4(1.0f);
+    material.baseColorMap = material.metallicRoughnessMap = {};
+    material.metallic = 0.0f;
     if (specular->Has("diffuseFactor"))
       for (int c = 0; c < 4; ++c)
         material.baseColor[c] = toFloat(specular->Get("diffuseFactor").Get(c).GetNumberAsDouble());

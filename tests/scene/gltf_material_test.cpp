@@ -135,6 +135,16 @@ TEST(GltfMaterial, SpecularGlossinessGivesItsDiffuseColour) {
   EXPECT_TRUE(scene.materials[0].baseColorMap);
 }
 
+TEST(GltfMaterial, SpecularGlossinessTakesThePlaceOfItsFallback) {
+  auto g = textured({{"pbrMetallicRoughness",
+                      {{"baseColorFactor", {1, 0, 0, 1}}, {"metallicFactor", 1}, {"baseColorTexture", {{"index", 0}}}}},
+                     {"extensions", {{"KHR_materials_pbrSpecularGlossiness", {{"glossinessFactor", 0.3}}}}}});
+  LOAD_OR_FAIL(scene, g.load());
+  EXPECT_EQ(scene.materials[0].baseColor, Vec4(1.0f));
+  EXPECT_FALSE(scene.materials[0].baseColorMap);
+  EXPECT_EQ(scene.materials[0].metallic, 0.0f);
+}
+
 TEST(GltfMaterial, ImagesInBufferViewsAndTexturesWithoutASource) {
   auto g =
       textured({{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}, {"emissiveTexture", {{"index", 1}}}});
