@@ -91,8 +91,15 @@ double cpuSeconds() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
+template <class Work>
+double secondsOf(Work work) {
+  const double start = cpuSeconds();
+  work();
+  return cpuSeconds() - start;
+}
+
 /// Time inside Embree's calls: all of them that this program makes go through the wrappers below (linked with --wrap).
-/// Off, a wrapper is a jump; on, it reads the time stamp counter twice, 12 ns on a quiet machine.
+/// Off, a wrapper is a jump; on, it reads the time stamp counter twice.
 struct EmbreeClock {
   bool on = false;
   std::uint64_t ticks = 0;
@@ -109,40 +116,56 @@ void timed(Call call) {
   ++embreeClock.calls;
 }
 
-double secondsPerTick() {
-  static const double perTick = [] {
-    const auto start = std::chrono::steady_clock::now();
+double nsPerTick() {
+  static const double ns = [] {
+    using Clock = std::chrono::steady_clock;
+    const auto start = Clock::now();
     const std::uint64_t first = __rdtsc();
-    while (std::chrono::steady_clock::now() - start < std::chrono::milliseconds(50)) {
+    while (Clock::now() - start < std::chrono::milliseconds(50)) {
     }
-    const std::uint64_t ticks = __rdtsc() - first;
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / static_cast<double>(ticks);
+    return std::chrono::duration<double, std::nano>(Clock::now() - start).count() /
+           static_cast<double>(__rdtsc() - first);
   }();
-  return perTick;
+  return ns;
 }
 
-/// Ticks that the clock counts of an empty call.
-double emptyTicks() {
-  static const double empty = [] {
-    constexpr int kCalls = 100000;
+/// Of an empty call: what the clock sees of it, and what it takes in all.
+struct ClockCost {
+  double seenTicks = 0.0;
+  double ticks = 0.0;
+};
+const ClockCost& clockCost() {
+  static const ClockCost cost = [] {
+    constexpr int kCalls = 1'000'000;
     embreeClock = {.on = true};
+    const std::uint64_t first = __rdtsc();
     for (int i = 0; i < kCalls; ++i) timed([] { benchmark::ClobberMemory(); });
-    const auto ticks = static_cast<double>(embreeClock.ticks);
+    const auto all = static_cast<double>(__rdtsc() - first);
+    const auto seen = static_cast<double>(embreeClock.ticks);
     embreeClock = {};
-    return ticks / kCalls;
+    return ClockCost{seen / kCalls, all / kCalls};
   }();
-  return empty;
+  return cost;
 }
 
-/// Seconds that `work` spends inside Embree.
+/// Nanoseconds, the clock's own taken off.
+struct Split {
+  double embree = 0.0;
+  double outside = 0.0;
+};
+
 template <class Work>
-double secondsInEmbree(Work work) {
-  const double empty = emptyTicks();
+Split splitOf(Work work) {
+  const ClockCost& cost = clockCost();
   embreeClock = {.on = true};
+  const std::uint64_t first = __rdtsc();
   work();
-  const EmbreeClock done = embreeClock;
+  const auto all = static_cast<double>(__rdtsc() - first);
+  const auto ticks = static_cast<double>(embreeClock.ticks);
+  const auto calls = static_cast<double>(embreeClock.calls);
   embreeClock = {};
-  return (static_cast<double>(done.ticks) - static_cast<double>(done.calls) * empty) * secondsPerTick();
+  return {(ticks - calls * cost.seenTicks) * nsPerTick(),
+          (all - ticks - calls * (cost.ticks - cost.seenTicks)) * nsPerTick()};
 }
 
 struct Maps {
@@ -228,44 +251,41 @@ void compare(benchmark::State& state, int place, std::uint32_t samples, std::opt
   scene.gatherMode = mode;
   _mm_setcsr(_mm_getcsr() | 0x8040u);  // as bakes do
   const std::vector<std::size_t> firsts = spreadWaves(f, waves);
+  double naiveSum = 0, gatherSum = 0, rays = 0;
+  const auto gatherNaivelyAll = [&] {
+    naiveSum = 0;
+    for (const std::size_t first : firsts)
+      for (std::size_t t = first; t < first + kLanes; ++t) naiveSum += gatherNaively(f, t, samples).flat.x;
+  };
+  const auto gatherAll = [&] {
+    gatherSum = rays = 0;
+    for (const std::size_t first : firsts) {
+      const GatheredWave done = GatherWave(scene, 0, first, kLanes).gather(0, samples, f.cache, kOpen, {});
+      for (const GatheredTexel& texel : done.texels) gatherSum += texel.flat.x;
+      rays += static_cast<double>(done.rays);
+    }
+  };
   std::map<std::string, std::vector<double>> ns;
   std::vector<double> ratios;
-  double naiveSum = 0, gatherSum = 0, goneOn = 0, allRays = 0;
   for (auto _ : state) {
     for (int round = 0; round < rounds; ++round) {
-      double naive = 0, naiveTrace = 0, gather = 0, trace = 0, rays = 0;
-      for (const std::size_t first : firsts) {
-        const auto gatherAll = [&] { return GatherWave(scene, 0, first, kLanes).gather(0, samples, f.cache, kOpen, {}); };
-        const auto gatherAllNaively = [&] {
-          double sum = 0.0;
-          for (std::size_t t = first; t < first + kLanes; ++t) sum += gatherNaively(f, t, samples).flat.x;
-          return sum;
-        };
-        double start = cpuSeconds();
-        naiveSum += gatherAllNaively();
-        naive += cpuSeconds() - start;
-        start = cpuSeconds();
-        const GatheredWave done = gatherAll();
-        gather += cpuSeconds() - start;
-        for (const GatheredTexel& texel : done.texels) gatherSum += texel.flat.x;
-        goneOn += static_cast<double>(done.rays) - static_cast<double>(samples) * kLanes;
-        allRays += static_cast<double>(done.rays);
-        rays += static_cast<double>(done.rays);
-        naiveTrace += secondsInEmbree([&] { benchmark::DoNotOptimize(gatherAllNaively()); });
-        trace += secondsInEmbree([&] { benchmark::DoNotOptimize(gatherAll()); });
-      }
-      for (const auto& [name, seconds] : {std::pair("naive_ns", naive), std::pair("naive_trace_ns", naiveTrace),
-                                          std::pair("gather_ns", gather), std::pair("trace_ns", trace),
-                                          std::pair("outside_ns", gather - trace),
-                                          std::pair("naive_outside_ns", naive - naiveTrace)})
-        ns[name].push_back(1e9 * seconds / rays);
+      const double naive = secondsOf(gatherNaivelyAll);
+      const Split naiveSplit = splitOf(gatherNaivelyAll);
+      const double gather = secondsOf(gatherAll);
+      const Split split = splitOf(gatherAll);
+      for (const auto& [name, taken] :
+           {std::pair("naive_ns", 1e9 * naive), std::pair("naive_trace_ns", naiveSplit.embree),
+            std::pair("naive_outside_ns", naiveSplit.outside), std::pair("gather_ns", 1e9 * gather),
+            std::pair("trace_ns", split.embree), std::pair("outside_ns", split.outside)})
+        ns[name].push_back(taken / rays);
       ratios.push_back(naive / gather);
     }
   }
   for (const auto& [name, values] : ns) state.counters[name] = median(values);
   state.counters["speedup"] = median(ratios);
-  state.counters["went_on"] = goneOn / allRays;
+  state.counters["went_on"] = 1.0 - static_cast<double>(firsts.size() * kLanes * samples) / rays;
   state.counters["agreement"] = gatherSum / naiveSum;
+  state.counters["clock_ns"] = clockCost().ticks * nsPerTick();
   state.counters["triangles"] = static_cast<double>(f.grid.triangles());
 }
 
