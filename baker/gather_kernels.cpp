@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "baker/sampling.h"
+#include "baker/texel_cache.h"
 #include "lightmap/rnm_basis.h"
 
 namespace lumel {
@@ -62,6 +63,40 @@ LUMEL_FOR_EACH_CPU int differentNeighbours(const RayPacket& packet) {
     count += (differs & !missed) ? 1 : 0;
   }
   return count;
+}
+
+LUMEL_FOR_EACH_CPU FoundTexels sortFound(const RayPacket& packet, const std::array<std::uint32_t, kLanes>& texels,
+                                         std::uint32_t near) {
+  FoundTexels found;
+  std::uint32_t lookedUp = 0, hits = 0, rays = 0;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const std::uint32_t bit = 1u << lane;
+    const bool isRay = packet.valid[lane] != 0;
+    const bool isHit = isRay & (packet.rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID);
+    const bool isLookedUp = isHit & (texels[lane] != kNoTexel) & ((near & bit) == 0);
+    found.texels[lane] = isLookedUp ? texels[lane] : 0u;
+    lookedUp |= isLookedUp ? bit : 0u;
+    hits |= isHit ? bit : 0u;
+    rays |= isRay ? bit : 0u;
+  }
+  found.lookedUp = lookedUp;
+  found.others = hits & ~lookedUp;
+  found.missed = rays & ~hits;
+  return found;
+}
+
+LUMEL_FOR_EACH_CPU void lookUpLight(const FoundTexels& found, const Vec3* radiance, std::uint32_t stride,
+                                    const float* pdf, Vec3Lanes& light) {
+  Vec3Lanes reflected;
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    reflected.set(lane, radiance[std::size_t{found.texels[lane]} * stride]);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const bool isLookedUp = (found.lookedUp & (1u << lane)) != 0;
+    const float beta = kInvPi / pdf[lane];
+    light.x[lane] = pick(isLookedUp, beta * reflected.x[lane], 0.0f);
+    light.y[lane] = pick(isLookedUp, beta * reflected.y[lane], 0.0f);
+    light.z[lane] = pick(isLookedUp, beta * reflected.z[lane], 0.0f);
+  }
 }
 
 LUMEL_FOR_EACH_CPU bool addLight(const Vec3Lanes& dirTangent, const Vec3Lanes& kernels, const Vec3Lanes& light,

@@ -1,6 +1,9 @@
 // The inner loops of the gather, over the lanes of a wave: aiming rays, and adding what they found to the maps.
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include "baker/lanes.h"
 #include "baker/wave_points.h"
 
@@ -23,6 +26,20 @@ void aimCosineRays(const float* x, const float* y, const PointLanes& from, Aimed
 
 /// How many rays of a traced packet found something else than the lane before theirs; 0 to kLanes - 1.
 int differentNeighbours(const RayPacket& packet);
+
+/// What the rays of a packet found, as bits of lanes.
+struct FoundTexels {
+  alignas(64) std::array<std::uint32_t, kLanes> texels;  // by lane; 0 where none is to be looked up
+  std::uint32_t lookedUp = 0;
+  std::uint32_t others = 0;  // what a ray hit is not to be looked up
+  std::uint32_t missed = 0;
+};
+/// `texels`: kNoTexel where there is none; `near`: bits of lanes that are not to be looked up.
+FoundTexels sortFound(const RayPacket& packet, const std::array<std::uint32_t, kLanes>& texels, std::uint32_t near);
+
+/// light = radiance[texel * stride] * kInvPi / pdf for the lanes that are looked up, else 0.
+void lookUpLight(const FoundTexels& found, const Vec3* radiance, std::uint32_t stride, const float* pdf,
+                 Vec3Lanes& light);
 
 /// Sums of irradiance / pi over a few samples: of the flat map's three colours, then of those of the RNM maps.
 struct alignas(64) MapSums {

@@ -1,6 +1,7 @@
 #include "baker/gather_wave.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace lumel {
@@ -417,41 +418,44 @@ void GatherWave::launch(Packet& packet) {
 
 void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer, GatherSink& sink) const {
   const AimedRays& rays = packet.rays;
+  const TexelMap::Lookup& lookup = packet.lookup;
   const int level = scene_.levels.read(scene_.bounces, 0);
-  const bool shines = scene_.transport.environment.shines();
-  alignas(64) std::array<float, kLanes> beta;
-  for (std::size_t lane = 0; lane < kLanes; ++lane) beta[lane] = kInvPi / rays.pdf[lane];
-  Vec3Lanes light, sky;
-  if (shines && rays.packet.anyMissed()) scene_.transport.environment.arriving(rays.packet.directions(), rays.pdf, sky);
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    if (!rays.packet.valid[lane]) continue;
-    ++sink.result.rays;
-    const std::uint32_t texel = packet.lookup.texels[lane];
-    if (texel != kNoTexel && level >= 0 && packet.lookup.near[lane]) {
-      tracer.arriveNear(rays.packet, static_cast<int>(lane),
-                        flightOf(lane, net_.sample(packet.cell, lane), points_[pointOf(packet.cell)], rays), texel);
-    } else if (texel != kNoTexel) {
-      if (level >= 0) light.set(lane, beta[lane] * sink.reflectedBy(texel)[level]);
-      sink.passOnLevels(lane, rays.dirTangent[lane], Vec3(beta[lane]), texel, 0);
-    } else if (rays.packet.hit(static_cast<int>(lane))) {
-      sink.point = pointOf(packet.cell) % WavePoints::kMost;
-      tracer.arrive(rays.packet, static_cast<int>(lane),
-                    flightOf(lane, net_.sample(packet.cell, lane), points_[pointOf(packet.cell)], rays));
-    } else if (shines) {
-      light.set(lane, beta[lane] * sky[lane]);
-      if (!isFinite(light[lane])) continue;
-      if (scene_.indirectOnly) {
-        sink.addSeen(lane, rays.dirTangent[lane], light[lane]);
-        light.set(lane, Vec3(0.0f));
-      } else {
-        sink.addToLevels(lane, rays.dirTangent[lane], light[lane], 0);
-      }
-    }
-  }
+  const FoundTexels found = sortFound(rays.packet, lookup.texels, level >= 0 ? lookup.near : 0u);
+  sink.result.rays += static_cast<std::uint64_t>(std::popcount(found.lookedUp | found.others | found.missed));
+  Vec3Lanes light;
+  if (level >= 0)
+    lookUpLight(found, sink.cache.data() + level, static_cast<std::uint32_t>(scene_.levels.count), rays.pdf, light);
+  if (!scene_.levels.endless)
+    forEachLane(found.lookedUp, [&](std::size_t lane) {
+      sink.passOnLevels(lane, rays.dirTangent[lane], Vec3(kInvPi / rays.pdf[lane]), lookup.texels[lane], 0);
+    });
+  forEachLane(found.others, [&](std::size_t lane) {
+    const Flight flight = flightOf(lane, net_.sample(packet.cell, lane), points_[pointOf(packet.cell)], rays);
+    if (const std::uint32_t texel = lookup.texels[lane]; texel != kNoTexel)
+      return tracer.arriveNear(rays.packet, static_cast<int>(lane), flight, texel);
+    sink.point = pointOf(packet.cell) % WavePoints::kMost;
+    tracer.arrive(rays.packet, static_cast<int>(lane), flight);
+  });
+  if (found.missed != 0 && scene_.transport.environment.shines()) collectSky(rays, found.missed, light, sink);
   if (sink.tallied)
     for (std::size_t lane = 0; lane < kLanes; ++lane)
       if (isFinite(light[lane])) sink.tally(lane, rays.dirTangent[lane], light[lane]);
   sink.addToMaps(rays.dirTangent, light, [&](std::size_t lane) { return net_.sample(packet.cell, lane); });
+}
+
+/// Into `light`, for the lanes whose bits are set.
+void GatherWave::collectSky(const AimedRays& rays, std::uint32_t lanes, Vec3Lanes& light, GatherSink& sink) const {
+  Vec3Lanes sky;
+  scene_.transport.environment.arriving(rays.packet.directions(), rays.pdf, sky);
+  forEachLane(lanes, [&](std::size_t lane) {
+    const Vec3 arriving = kInvPi / rays.pdf[lane] * sky[lane];
+    const bool isSeen = isFinite(arriving) && scene_.indirectOnly;
+    if (isSeen)
+      sink.addSeen(lane, rays.dirTangent[lane], arriving);
+    else if (isFinite(arriving))
+      sink.addToLevels(lane, rays.dirTangent[lane], arriving, 0);
+    light.set(lane, isSeen ? Vec3(0.0f) : arriving);
+  });
 }
 
 }  // namespace lumel

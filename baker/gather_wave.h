@@ -147,6 +147,7 @@ class GatherWave {
   };
   void launch(Packet& packet);
   void collect(const Packet& packet, GatherTracer<GatherSink>& tracer, GatherSink& sink) const;
+  void collectSky(const AimedRays& rays, std::uint32_t lanes, Vec3Lanes& light, GatherSink& sink) const;
 
   const GatherScene& scene_;
   std::uint32_t page_;

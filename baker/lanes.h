@@ -3,7 +3,11 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <utility>
 
 #include "scene/each_cpu.h"
 #include "scene/math.h"
@@ -51,5 +55,52 @@ struct FrameLanes {
     n.set(lane, frame.n);
   }
 };
+
+/// Calls body(lane) for the lanes whose bits are set, in order.
+template <class Body>
+inline void forEachLane(std::uint32_t lanes, Body body) {
+  for (; lanes != 0; lanes &= lanes - 1) body(static_cast<std::size_t>(std::countr_zero(lanes)));
+}
+
+/// 32-bit values side by side.
+template <int Count>
+using Words __attribute__((vector_size(4 * Count))) = std::uint32_t;
+/// One for each lane.
+using LaneWords = Words<kLanes>;
+
+template <std::size_t... I>
+[[gnu::always_inline]] inline void join(const Words<sizeof...(I) / 2>& a, const Words<sizeof...(I) / 2>& b,
+                                        Words<sizeof...(I)>& both, std::index_sequence<I...>) {
+  both = __builtin_shufflevector(a, b, I...);
+}
+
+/// Rows of Count words one after another, `row(lane)` pointing to each, from `lane` on.
+template <int Count, int Total, class Row>
+[[gnu::always_inline]] inline void joinRows(Row row, std::size_t lane, Words<Total>& joined) {
+  if constexpr (Count == Total) {
+    std::memcpy(&joined, row(lane), sizeof joined);
+  } else {
+    Words<Total / 2> low, high;
+    joinRows<Count, Total / 2>(row, lane, low);
+    joinRows<Count, Total / 2>(row, lane + Total / 2 / Count, high);
+    join(low, high, joined, std::make_index_sequence<Total>());
+  }
+}
+
+/// From a row of Count words for each lane to Count words of each lane. Loops over rows take them value by value.
+template <int Count, class Row>
+[[gnu::always_inline]] inline void turnRows(Row row, std::array<LaneWords, Count>& columns) {
+  static_assert(Count == 2 || Count == 4 || Count == 8);
+  for (std::size_t i = 0; i < Count; ++i) joinRows<Count, kLanes>(row, kLanes / Count * i, columns[i]);
+  for (int step = 1; step < Count; step *= 2) {
+    const std::array<LaneWords, Count> rows = columns;
+    for (std::size_t i = 0; i < Count / 2; ++i) {
+      const LaneWords& a = rows[2 * i];
+      const LaneWords& b = rows[2 * i + 1];
+      columns[i] = __builtin_shufflevector(a, b, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+      columns[i + Count / 2] = __builtin_shufflevector(a, b, 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+    }
+  }
+}
 
 }  // namespace lumel

@@ -81,12 +81,6 @@ Vec3Lanes RayPacket::directions() const {
   return lanes;
 }
 
-bool RayPacket::anyMissed() const {
-  int any = 0;
-  for (int lane = 0; lane < kLanes; ++lane) any |= missed(lane) ? 1 : 0;
-  return any != 0;
-}
-
 ShadowPacket::ShadowPacket() {
   initRays(ray);
   clear();
@@ -260,13 +254,6 @@ void RayScene::occluded(ShadowPacket& rays, TraceMode mode) const {
     rtcOccluded1(top_.get(), &context, &one);
     rays.ray.tfar[lane] = one.tfar;
   }
-}
-
-std::uint32_t RayScene::partOf(const RayPacket& rays, int lane) const {
-  const RTCHit16& hit = rays.rayhit.hit;
-  const std::uint32_t instance = hit.instID[0][lane];
-  if (instance == RTC_INVALID_GEOMETRY_ID) return partOfGeometry_[hit.geomID[lane]];
-  return partOfGeometry_[instance] + hit.geomID[lane];
 }
 
 float RayScene::translationOf(int instance) const {

@@ -42,7 +42,6 @@ struct alignas(64) RayPacket {
   Vec3Lanes directions() const;
   bool hit(int lane) const { return valid[lane] != 0 && rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID; }
   bool missed(int lane) const { return valid[lane] != 0 && rayhit.hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID; }
-  bool anyMissed() const;
 };
 
 /// Up to 16 rays that ask only whether anything lies between their ends.
@@ -120,7 +119,12 @@ class RayScene {
   /// Precondition: rays.hit(lane).
   HitSurface surfaceAt(const RayPacket& rays, int lane) const;
   /// Index of the part that was hit. Precondition: rays.hit(lane).
-  std::uint32_t partOf(const RayPacket& rays, int lane) const;
+  std::uint32_t partOf(const RayPacket& rays, int lane) const {
+    const RTCHit16& hit = rays.rayhit.hit;
+    const std::uint32_t instance = hit.instID[0][lane];
+    if (instance == RTC_INVALID_GEOMETRY_ID) return partOfGeometry_[hit.geomID[lane]];
+    return partOfGeometry_[instance] + hit.geomID[lane];
+  }
 
   /// Interpolated, on the side of hit.ng; hit.ng itself where the mesh has no usable normal.
   Vec3 shadingNormal(const HitSurface& hit) const;

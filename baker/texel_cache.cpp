@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <limits>
 #include <map>
 #include <utility>
@@ -32,42 +34,32 @@ std::uint32_t tileBit(std::uint32_t x, std::uint32_t y) { return 4 * (y & 3u) + 
   return (bits + (bits >> 8)) & 0x1fu;
 }
 
-using LaneWords = std::array<std::uint32_t, kLanes>;
-
-/// The texel of each lane's pixel, `covered` and `first` of its tile given.
-LUMEL_FOR_EACH_CPU void countTexels(const LaneWords& first, const LaneWords& covered, const LaneWords& bits,
-                                    LaneWords& texels) {
+/// Where Embree places no instances its geometries are the parts, in the same order.
+LUMEL_FOR_EACH_CPU void geometriesOf(const RayPacket& packet, std::uint32_t none,
+                                     std::array<std::uint32_t, kLanes>& parts) {
+#pragma GCC ivdep
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const std::uint32_t bit = 1u << bits[lane];
-    const std::uint32_t texel = first[lane] + countBits(covered[lane] & (bit - 1u));
-    texels[lane] = (covered[lane] & bit) != 0 ? texel : kNoTexel;
+    const std::uint32_t geometry = packet.rayhit.hit.geomID[lane];
+    parts[lane] = (packet.valid[lane] != 0) & (geometry != RTC_INVALID_GEOMETRY_ID) ? geometry : none;
   }
-}
-
-/// Positive where a ray runs along the normal that Embree gave.
-LUMEL_FOR_EACH_CPU void alongNormals(const RayPacket& packet, std::array<float, kLanes>& along) {
-  const RTCRay16& ray = packet.rayhit.ray;
-  const RTCHit16& hit = packet.rayhit.hit;
-  for (std::size_t lane = 0; lane < kLanes; ++lane)
-    along[lane] = glm::dot(Vec3(ray.dir_x[lane], ray.dir_y[lane], ray.dir_z[lane]),
-                           Vec3(hit.Ng_x[lane], hit.Ng_y[lane], hit.Ng_z[lane]));
 }
 
 }  // namespace
 
 TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<PageTexels>& texels)
-    : rays_(rays), atlas_(atlas), texels_(texels) {
+    : rays_(rays), atlas_(atlas), texels_(texels), placesInstances_(rays.placesInstances()) {
   firstOfPage_.push_back(0);
-  pages_.push_back({.width = 1, .height = 1, .firstTile = 0, .tilesAcross = 1});
+  pages_.push_back({.width = 1, .height = 1, .firstTile = 0});
+  for (const PageTexels& page : texels)
+    tilesAcross_ = std::max(tilesAcross_, static_cast<std::uint32_t>(page.width / 4 + 1));
   std::size_t count = 0;
   std::size_t tiles = 1;
   for (const PageTexels& page : texels) {
     count += page.size();
     LUMEL_CHECK(count < kNoTexel);
     firstOfPage_.push_back(static_cast<std::uint32_t>(count));
-    const auto across = static_cast<std::uint32_t>((page.width + 3) / 4);
-    pages_.push_back({page.width, page.height, static_cast<std::uint32_t>(tiles), across});
-    tiles += std::size_t{across} * static_cast<std::size_t>((page.height + 3) / 4);
+    pages_.push_back({page.width, page.height, static_cast<std::uint32_t>(tiles)});
+    tiles += std::size_t{tilesAcross_} * static_cast<std::size_t>(page.height / 4 + 1);
     LUMEL_CHECK(tiles < kNoTexel);
   }
   tiles_.resize(tiles);
@@ -76,7 +68,7 @@ TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<P
     for (std::size_t i = 0; i < texels[p].size(); ++i) {
       const TexelCoord c = texels[p].coords[i];
       const std::uint32_t texel = firstOfPage_[p] + static_cast<std::uint32_t>(i);
-      Tile& tile = tiles_[page.firstTile + std::size_t{c.y} / 4 * page.tilesAcross + c.x / 4];
+      Tile& tile = tiles_[page.firstTile + std::size_t{c.y} / 4 * tilesAcross_ + c.x / 4];
       if (tile.covered == 0) tile.first = texel;
       tile.covered |= 1u << tileBit(c.x, c.y);
       // The order of PageTexels: what comes later lies behind it in its tile.
@@ -85,8 +77,9 @@ TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<P
   }
 
   for (const ScenePart& part : rays.parts())
-    parts_.push_back({.shines = part.firstEmitter >= 0, .frontSign = part.worldPositions ? part.frontSign : 0.0f});
-  parts_.push_back({.frontSign = 1.0f});
+    lookedUp_.push_back({.frontSign = part.frontSign});
+  lookedUp_.emplace_back();
+  firstTriangle_.resize(rays.parts().size(), kNowhere);
   triangles_.emplace_back();
   // Instances and primitives number surfaces; parts leave out what rays cannot hit.
   std::map<std::pair<int, const Primitive*>, std::uint32_t> partOf;
@@ -100,14 +93,14 @@ TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<P
 
 void TexelMap::addSurface(std::uint32_t part, const Surface& surface) {
   const ScenePart& source = rays_.parts()[part];
-  std::uint32_t& first = parts_[part].firstTriangle;
+  std::uint32_t& first = firstTriangle_[part];
   if (first == kNowhere) {
     LUMEL_CHECK(triangles_.size() + source.primitive->triangleCount() < kNoTexel);
     first = static_cast<std::uint32_t>(triangles_.size());
     triangles_.resize(triangles_.size() + source.primitive->triangleCount());
+    if (source.firstEmitter < 0) lookedUp_[part].firstTriangle = first;
   }
-  const std::uint32_t pageNumber = static_cast<std::uint32_t>(surface.page) + 1;
-  const PageMap& page = pages_[pageNumber];
+  const PageMap& page = pages_[static_cast<std::size_t>(surface.page) + 1];
   for (std::size_t t = 0; t < surface.triangleCount(); ++t) {
     const std::uint32_t sourceTriangle = surface.sourceTriangle[t];
     const std::uint32_t* sourceCorner = source.primitive->indices.data() + std::size_t{3} * sourceTriangle;
@@ -119,7 +112,7 @@ void TexelMap::addSurface(std::uint32_t part, const Surface& surface) {
           pixels[i] = surface.lightmapUvs[vertex] * Vec2(page.width, page.height);
       }
     triangles_[std::size_t{first} + sourceTriangle] = {pixels[0], pixels[1] - pixels[0], pixels[2] - pixels[0],
-                                                       pageNumber, texelWidth(surface, t, pixels)};
+                                                       page.firstTile, texelWidth(surface, t, pixels)};
   }
 }
 
@@ -129,11 +122,17 @@ std::size_t TexelMap::pageOf(std::uint32_t texel) const {
          1;
 }
 
+const TexelMap::PageMap& TexelMap::pageOf(const Triangle& triangle) const {
+  const auto next = std::upper_bound(pages_.begin(), pages_.end(), triangle.firstTile,
+                                     [](std::uint32_t tile, const PageMap& page) { return tile < page.firstTile; });
+  return *(next - 1);
+}
+
 std::uint32_t TexelMap::at(const PageMap& page, int x, int y) const {
   if (x < 0 || y < 0 || x >= page.width || y >= page.height) return kNoTexel;
   const auto column = static_cast<std::uint32_t>(x);
   const auto row = static_cast<std::uint32_t>(y);
-  const Tile& tile = tiles_[page.firstTile + std::size_t{row / 4} * page.tilesAcross + column / 4];
+  const Tile& tile = tiles_[page.firstTile + std::size_t{row / 4} * tilesAcross_ + column / 4];
   const std::uint32_t bit = 1u << tileBit(column, row);
   return (tile.covered & bit) != 0 ? tile.first + countBits(tile.covered & (bit - 1u)) : kNoTexel;
 }
@@ -163,60 +162,109 @@ std::uint32_t TexelMap::find(std::uint32_t part, const RayPacket& packet, int la
 }
 
 std::uint32_t TexelMap::under(std::uint32_t part, const RayPacket& packet, int lane) const {
-  const std::uint32_t first = parts_[part].firstTriangle;
+  const std::uint32_t first = firstTriangle_[part];
   if (first == kNowhere) return kNoTexel;
   const RTCHit16& hit = packet.rayhit.hit;
   const Triangle& triangle = triangles_[std::size_t{first} + hit.primID[lane]];
-  if (triangle.page == kNowhere) return kNoTexel;
-  const PageMap& page = pages_[triangle.page];
+  if (triangle.firstTile == kNowhere) return kNoTexel;
+  const PageMap& page = pageOf(triangle);
   const Vec2 pixel = triangle.at(hit.u[lane], hit.v[lane]);
   const std::uint32_t texel = at(page, static_cast<int>(std::floor(pixel.x)), static_cast<int>(std::floor(pixel.y)));
   return texel != kNoTexel ? texel : texelBeside(page, pixel);
 }
 
-void TexelMap::findTriangles(const RayPacket& packet, Lookup& lookup) const {
-  std::array<float, kLanes> along;
-  alongNormals(packet, along);
-  const auto none = static_cast<std::uint32_t>(parts_.size() - 1);
-  for (int lane = 0; lane < kLanes; ++lane) {
-    const auto l = static_cast<std::size_t>(lane);
-    const std::uint32_t part = packet.hit(lane) ? rays_.partOf(packet, lane) : none;
-    const PartMap& map = parts_[part];
-    const bool isBack = map.frontSign != 0.0f ? along[l] * map.frontSign > 0.0f : fromBehind(part, packet, lane);
-    const bool isFound = (map.firstTriangle != kNowhere) & (map.shines == 0) & !isBack;
-    lookup.triangles[l] = isFound ? map.firstTriangle + packet.rayhit.hit.primID[lane] : kNowhere;
-    __builtin_prefetch(triangles_.data() + lookup.triangles[l]);
+LUMEL_FOR_EACH_CPU void TexelMap::chooseTriangles(const RayPacket& packet, const PartMap* parts, Lookup& lookup) {
+  const RTCRay16& ray = packet.rayhit.ray;
+  const RTCHit16& hit = packet.rayhit.hit;
+  std::array<LaneWords, 2> columns;
+  turnRows<2>([&](std::size_t lane) { return parts + lookup.parts[lane]; }, columns);
+  alignas(64) std::uint32_t firsts[kLanes];
+  alignas(64) float signs[kLanes];
+  std::memcpy(firsts, &columns[0], sizeof firsts);
+  std::memcpy(signs, &columns[1], sizeof signs);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const float along = glm::dot(Vec3(ray.dir_x[lane], ray.dir_y[lane], ray.dir_z[lane]),
+                                 Vec3(hit.Ng_x[lane], hit.Ng_y[lane], hit.Ng_z[lane]));
+    const bool isFound = (firsts[lane] != kNowhere) & !(along * signs[lane] > 0.0f);
+    lookup.triangles[lane] = isFound ? firsts[lane] + hit.primID[lane] : kNowhere;
   }
+}
+
+void TexelMap::findTriangles(const RayPacket& packet, Lookup& lookup) const {
+  const auto none = static_cast<std::uint32_t>(lookedUp_.size() - 1);
+  if (!placesInstances_)
+    geometriesOf(packet, none, lookup.parts);
+  else
+    for (int lane = 0; lane < kLanes; ++lane)
+      lookup.parts[static_cast<std::size_t>(lane)] = packet.hit(lane) ? rays_.partOf(packet, lane) : none;
+  chooseTriangles(packet, lookedUp_.data(), lookup);
+  if (placesInstances_)
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const auto l = static_cast<std::size_t>(lane);
+      const std::uint32_t part = lookup.parts[l];
+      if (part == none || rays_.parts()[part].worldPositions) continue;
+      const bool isFound = lookedUp_[part].firstTriangle != kNowhere && !fromBehind(part, packet, lane);
+      lookup.triangles[l] = isFound ? lookedUp_[part].firstTriangle + packet.rayhit.hit.primID[lane] : kNowhere;
+    }
+  for (const std::uint32_t triangle : lookup.triangles) __builtin_prefetch(triangles_.data() + triangle);
+}
+
+LUMEL_FOR_EACH_CPU void TexelMap::placePixels(const RayPacket& packet, const Triangle* triangles,
+                                              std::uint32_t tilesAcross, Lookup& lookup) {
+  std::array<LaneWords, 8> columns;
+  turnRows<8>([&](std::size_t lane) { return triangles + lookup.triangles[lane]; }, columns);
+  alignas(64) float of[8][kLanes];  // Triangle's members in order
+  alignas(64) std::uint32_t firstTile[kLanes];
+  std::memcpy(of, &columns, sizeof of);
+  std::memcpy(firstTile, &columns[6], sizeof firstTile);
+  std::uint32_t near = 0;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const bool isFound = lookup.triangles[lane] != kNowhere;
+    const float u = pick(isFound, packet.rayhit.hit.u[lane], 0.0f), v = pick(isFound, packet.rayhit.hit.v[lane], 0.0f);
+    const float x = of[0][lane] + u * of[2][lane] + v * of[4][lane];
+    const float y = of[1][lane] + u * of[3][lane] + v * of[5][lane];
+    // Rounding may lead over the page's border, below zero or into the row and column that pages have beyond it.
+    const auto column = static_cast<std::uint32_t>(std::max(static_cast<int>(x), 0));
+    const auto row = static_cast<std::uint32_t>(std::max(static_cast<int>(y), 0));
+    lookup.x[lane] = x;
+    lookup.y[lane] = y;
+    near |= packet.rayhit.ray.tfar[lane] < Lookup::kNearTexels * of[7][lane] ? 1u << lane : 0u;
+    lookup.bits[lane] = tileBit(column, row);
+    lookup.tiles[lane] = firstTile[lane] + row / 4 * tilesAcross + column / 4;
+  }
+  lookup.near = near;
 }
 
 void TexelMap::findPixels(const RayPacket& packet, Lookup& lookup) const {
+  static_assert(sizeof(Triangle) == 32 && offsetof(Triangle, firstTile) == 24 && offsetof(Triangle, texelMeters) == 28);
+  placePixels(packet, triangles_.data(), tilesAcross_, lookup);
+  for (const std::uint32_t tile : lookup.tiles) __builtin_prefetch(tiles_.data() + tile);
+}
+
+/// Returns whether a pixel is not covered.
+LUMEL_FOR_EACH_CPU bool TexelMap::countTexels(const Tile* tiles, Lookup& lookup) {
+  static_assert(sizeof(Tile) == 8);
+  std::array<LaneWords, 2> columns;
+  turnRows<2>([&](std::size_t lane) { return tiles + lookup.tiles[lane]; }, columns);
+  alignas(64) std::uint32_t of[2][kLanes];
+  std::memcpy(of, &columns, sizeof of);
+  int beside = 0;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const Triangle& triangle = triangles_[lookup.triangles[lane]];
-    const PageMap& page = pages_[triangle.page];
-    const bool isFound = lookup.triangles[lane] != kNowhere;
-    const Vec2 place =
-        triangle.at(pick(isFound, packet.rayhit.hit.u[lane], 0.0f), pick(isFound, packet.rayhit.hit.v[lane], 0.0f));
-    // Rounding may lead over the page's border.
-    const auto x = static_cast<std::uint32_t>(std::clamp(static_cast<int>(place.x), 0, page.width - 1));
-    const auto y = static_cast<std::uint32_t>(std::clamp(static_cast<int>(place.y), 0, page.height - 1));
-    lookup.places[lane] = place;
-    lookup.near[lane] = packet.rayhit.ray.tfar[lane] < Lookup::kNearTexels * triangle.texelMeters;
-    lookup.bits[lane] = tileBit(x, y);
-    lookup.tiles[lane] = tiles_.data() + page.firstTile + std::size_t{y / 4} * page.tilesAcross + x / 4;
-    __builtin_prefetch(lookup.tiles[lane]);
+    const std::uint32_t covered = of[1][lane];
+    const std::uint32_t bit = 1u << lookup.bits[lane];
+    const std::uint32_t texel = of[0][lane] + countBits(covered & (bit - 1u));
+    const bool isCovered = (covered & bit) != 0;
+    lookup.texels[lane] = isCovered ? texel : kNoTexel;
+    beside |= !isCovered & (lookup.triangles[lane] != kNowhere) ? 1 : 0;
   }
+  return beside != 0;
 }
 
 void TexelMap::findTexels(Lookup& lookup) const {
-  LaneWords first, covered;
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    first[lane] = lookup.tiles[lane]->first;
-    covered[lane] = lookup.tiles[lane]->covered;
-  }
-  countTexels(first, covered, lookup.bits, lookup.texels);
+  if (!countTexels(tiles_.data(), lookup)) return;
   for (std::size_t lane = 0; lane < kLanes; ++lane)
     if (lookup.texels[lane] == kNoTexel && lookup.triangles[lane] != kNowhere)
-      lookup.texels[lane] = texelBeside(pages_[triangles_[lookup.triangles[lane]].page], lookup.places[lane]);
+      lookup.texels[lane] = texelBeside(pageOf(triangles_[lookup.triangles[lane]]), {lookup.x[lane], lookup.y[lane]});
 }
 
 std::uint32_t TexelMap::chartOf(const PageTexels& page, std::size_t texel) const {
@@ -261,7 +309,7 @@ bool TexelMap::anyInReach(const PageMap& page, const TexelCoord& at, std::span<c
   const int x0 = std::max(0, at.x - kReach) / 4, x1 = std::min(page.width - 1, at.x + kReach) / 4;
   const int y0 = std::max(0, at.y - kReach) / 4, y1 = std::min(page.height - 1, at.y + kReach) / 4;
   for (int y = y0; y <= y1; ++y) {
-    const std::uint8_t* row = tileIsValid.data() + page.firstTile + static_cast<std::size_t>(y) * page.tilesAcross;
+    const std::uint8_t* row = tileIsValid.data() + page.firstTile + static_cast<std::size_t>(y) * tilesAcross_;
     if (std::any_of(row + x0, row + x1 + 1, [](std::uint8_t v) { return v != 0; })) return true;
   }
   return false;

@@ -61,22 +61,20 @@ class TexelMap {
 
  private:
   struct alignas(32) Triangle {
-    Vec2 pixel{0}, perU{0}, perV{0};  // on the page: of the first corner, and how it moves with the barycentrics
-    std::uint32_t page = 0;
-    float texelMeters = 0.0f;  // width of a texel on the surface
+    Vec2 pixel{0}, perU{0}, perV{0};    // on the page: of the first corner, and how it moves with the barycentrics
+    std::uint32_t firstTile = kNowhere;  // of the page
+    float texelMeters = 0.0f;            // width of a texel on the surface
 
     Vec2 at(float u, float v) const { return pixel + u * perU + v * perV; }
   };
   struct PartMap {
-    std::uint32_t firstTriangle = kNowhere;  // into triangles_; kNowhere: no lightmap
-    std::uint32_t shines = 0;
-    float frontSign = 0.0f;  // ScenePart::frontSign; 0: Embree places the part
+    std::uint32_t firstTriangle = kNowhere;  // into triangles_; kNowhere: no lightmap, or it shines
+    float frontSign = 0.0f;                  // ScenePart::frontSign
   };
   struct PageMap {
     int width = 0;
     int height = 0;
-    std::uint32_t firstTile = 0;
-    std::uint32_t tilesAcross = 0;
+    std::uint32_t firstTile = 0;  // rows of tilesAcross_, with one more row and column than the page has
   };
   /// 4 x 4 pixels. Texels are numbered tile by tile (PageTexels::coords), so a texel is the first of its tile and as
   /// many more as are covered before it: the map of a page fits into a processor's cache.
@@ -88,6 +86,11 @@ class TexelMap {
   static constexpr std::uint32_t kNowhere = 0;
 
   void addSurface(std::uint32_t part, const Surface& surface);
+  static void chooseTriangles(const RayPacket& packet, const PartMap* parts, Lookup& lookup);
+  static void placePixels(const RayPacket& packet, const Triangle* triangles, std::uint32_t tilesAcross,
+                          Lookup& lookup);
+  static bool countTexels(const Tile* tiles, Lookup& lookup);
+  const PageMap& pageOf(const Triangle& triangle) const;
   bool fromBehind(std::uint32_t part, const RayPacket& packet, int lane) const;
   std::uint32_t texelBeside(const PageMap& page, const Vec2& pixel) const;
   std::uint32_t at(const PageMap& page, int x, int y) const;
@@ -100,25 +103,31 @@ class TexelMap {
   const RayScene& rays_;
   const Atlas& atlas_;
   const std::vector<PageTexels>& texels_;
+  const bool placesInstances_;
   std::vector<std::uint32_t> firstOfPage_;  // [pages + 1]
   std::vector<PageMap> pages_;              // from 1 on
+  std::uint32_t tilesAcross_ = 0;           // of all pages, so that lookups need not know which
   std::vector<Tile> tiles_;
-  std::vector<PartMap> parts_;  // and last one for rays that hit nothing
+  // Of rays' first triangles, in lookups: and last one for rays that hit nothing.
+  std::vector<PartMap> lookedUp_;
+  std::vector<std::uint32_t> firstTriangle_;  // per part, shining ones too
   std::vector<Triangle> triangles_;
 };
 
 struct TexelMap::Lookup {
-  std::array<std::uint32_t, kLanes> texels;
-  /// Whether the ray is shorter than kNearTexels texels of what it hit: one value for a whole texel is then too coarse.
-  std::array<bool, kLanes> near;
+  alignas(64) std::array<std::uint32_t, kLanes> texels;
+  /// Which rays are shorter than kNearTexels texels of what they hit: one value for a whole texel is then too coarse.
+  std::uint32_t near;  // bits of lanes
   static constexpr float kNearTexels = 1.5f;
 
  private:
   friend TexelMap;
-  std::array<std::uint32_t, kLanes> triangles;
-  std::array<const Tile*, kLanes> tiles;
-  std::array<std::uint32_t, kLanes> bits;  // of the pixel in its tile
-  std::array<Vec2, kLanes> places;
+  alignas(64) std::array<std::uint32_t, kLanes> parts;
+  alignas(64) std::array<std::uint32_t, kLanes> triangles;
+  alignas(64) std::array<std::uint32_t, kLanes> tiles;
+  alignas(64) std::array<std::uint32_t, kLanes> bits;  // of the pixel in its tile
+  alignas(64) std::array<float, kLanes> x;
+  alignas(64) std::array<float, kLanes> y;
 };
 
 }  // namespace lumel

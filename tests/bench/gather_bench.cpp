@@ -1,4 +1,4 @@
-// The gather against a naive loop over the same rays, and where its time goes. One thread; CPU time.
+// The gather against a naive loop over the same rays, and where its time goes. One thread.
 //   lumel_bench_gather                                everything
 //   lumel_bench_gather --benchmark_filter=speedup     the ratios, naive and gather taken in turns
 //   lumel_bench_gather --benchmark_filter=smoke       the smoke pass of ctest
@@ -7,7 +7,6 @@
 // rays, and their tracing as Embree's.
 #include <benchmark/benchmark.h>
 
-#include <time.h>
 #include <x86intrin.h>
 
 #include <algorithm>
@@ -85,19 +84,6 @@ std::vector<std::size_t> spreadWaves(const Fixture& f, std::size_t count) {
   return firsts;
 }
 
-double cpuSeconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
-template <class Work>
-double secondsOf(Work work) {
-  const double start = cpuSeconds();
-  work();
-  return cpuSeconds() - start;
-}
-
 /// Time inside Embree's calls: all of them that this program makes go through the wrappers below (linked with --wrap).
 /// Off, a wrapper is a jump; on, it reads the time stamp counter twice.
 struct EmbreeClock {
@@ -146,6 +132,13 @@ const ClockCost& clockCost() {
     return ClockCost{seen / kCalls, all / kCalls};
   }();
   return cost;
+}
+
+template <class Work>
+double nsOf(Work work) {
+  const std::uint64_t first = __rdtsc();
+  work();
+  return static_cast<double>(__rdtsc() - first) * nsPerTick();
 }
 
 /// Nanoseconds, the clock's own taken off.
@@ -243,7 +236,24 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// Naive loop and gather in turns over the same waves; medians over rounds.
+/// What each wave took, round by round.
+class WaveTimes {
+ public:
+  explicit WaveTimes(std::size_t waves) : ns_(waves) {}
+  void add(std::size_t wave, double ns) { ns_[wave].push_back(ns); }
+  /// Of all waves, the median of each: whoever else used the processor at times does not count.
+  double sum() const {
+    double all = 0.0;
+    for (const std::vector<double>& rounds : ns_) all += median(rounds);
+    return all;
+  }
+
+ private:
+  std::vector<std::vector<double>> ns_;
+};
+
+/// Naive loop and gather in turns over the same waves: all waves by the one, then all by the other, so that neither
+/// finds in the caches what the other has just read.
 void compare(benchmark::State& state, int place, std::uint32_t samples, std::optional<TraceMode> mode,
              std::size_t waves, int rounds) {
   const Fixture& f = fixture(place);
@@ -252,38 +262,35 @@ void compare(benchmark::State& state, int place, std::uint32_t samples, std::opt
   _mm_setcsr(_mm_getcsr() | 0x8040u);  // as bakes do
   const std::vector<std::size_t> firsts = spreadWaves(f, waves);
   double naiveSum = 0, gatherSum = 0, rays = 0;
-  const auto gatherNaivelyAll = [&] {
-    naiveSum = 0;
-    for (const std::size_t first : firsts)
-      for (std::size_t t = first; t < first + kLanes; ++t) naiveSum += gatherNaively(f, t, samples).flat.x;
+  const auto gatherWaveNaively = [&](std::size_t first) {
+    for (std::size_t t = first; t < first + kLanes; ++t) naiveSum += gatherNaively(f, t, samples).flat.x;
   };
-  const auto gatherAll = [&] {
-    gatherSum = rays = 0;
-    for (const std::size_t first : firsts) {
-      const GatheredWave done = GatherWave(scene, 0, first, kLanes).gather(0, samples, f.cache, kOpen, {});
-      for (const GatheredTexel& texel : done.texels) gatherSum += texel.flat.x;
-      rays += static_cast<double>(done.rays);
+  const auto gatherWave = [&](std::size_t first) {
+    const GatheredWave done = GatherWave(scene, 0, first, kLanes).gather(0, samples, f.cache, kOpen, {});
+    for (const GatheredTexel& texel : done.texels) gatherSum += texel.flat.x;
+    rays += static_cast<double>(done.rays);
+  };
+  WaveTimes naive(waves), naiveEmbree(waves), naiveOutside(waves), gather(waves), embree(waves), outside(waves);
+  const auto measure = [&](auto work, WaveTimes& whole, WaveTimes& inEmbree, WaveTimes& rest) {
+    for (std::size_t w = 0; w < waves; ++w) whole.add(w, nsOf([&] { work(firsts[w]); }));
+    for (std::size_t w = 0; w < waves; ++w) {
+      const Split split = splitOf([&] { work(firsts[w]); });
+      inEmbree.add(w, split.embree);
+      rest.add(w, split.outside);
     }
   };
-  std::map<std::string, std::vector<double>> ns;
-  std::vector<double> ratios;
-  for (auto _ : state) {
+  for (auto _ : state)
     for (int round = 0; round < rounds; ++round) {
-      const double naive = secondsOf(gatherNaivelyAll);
-      const Split naiveSplit = splitOf(gatherNaivelyAll);
-      const double gather = secondsOf(gatherAll);
-      const Split split = splitOf(gatherAll);
-      for (const auto& [name, taken] :
-           {std::pair("naive_ns", 1e9 * naive), std::pair("naive_trace_ns", naiveSplit.embree),
-            std::pair("naive_outside_ns", naiveSplit.outside), std::pair("gather_ns", 1e9 * gather),
-            std::pair("trace_ns", split.embree), std::pair("outside_ns", split.outside)})
-        ns[name].push_back(taken / rays);
-      ratios.push_back(naive / gather);
+      measure(gatherWaveNaively, naive, naiveEmbree, naiveOutside);
+      measure(gatherWave, gather, embree, outside);
     }
-  }
-  for (const auto& [name, values] : ns) state.counters[name] = median(values);
-  state.counters["speedup"] = median(ratios);
-  state.counters["went_on"] = 1.0 - static_cast<double>(firsts.size() * kLanes * samples) / rays;
+  const double raysOnce = rays / (2.0 * rounds);
+  for (const auto& [name, times] : {std::pair("naive_ns", &naive), std::pair("naive_trace_ns", &naiveEmbree),
+                                    std::pair("naive_outside_ns", &naiveOutside), std::pair("gather_ns", &gather),
+                                    std::pair("trace_ns", &embree), std::pair("outside_ns", &outside)})
+    state.counters[name] = times->sum() / raysOnce;
+  state.counters["speedup"] = naive.sum() / gather.sum();
+  state.counters["went_on"] = 1.0 - static_cast<double>(waves * kLanes * samples) / raysOnce;
   state.counters["agreement"] = gatherSum / naiveSum;
   state.counters["clock_ns"] = clockCost().ticks * nsPerTick();
   state.counters["triangles"] = static_cast<double>(f.grid.triangles());
