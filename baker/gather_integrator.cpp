@@ -102,7 +102,7 @@ void GatherIntegrator::makeCache() {
   warmBacks_.resize(map_.size());
   if (scene_.levels.count == 0) return;
   reflectance_.resize(map_.size());
-  if (!scene_.levels.endless) cache_.resize(map_.size() * stored());  // else it is what the warm-up ends with
+  if (!scene_.levels.endless) cache_.resize(map_.size() * stored() + 1);  // else it is what the warm-up ends with
   if (!scene_.indirectOnly) return;
   direct_.resize(map_.size());
   seen_.resize(map_.size());
@@ -243,7 +243,7 @@ void GatherIntegrator::solveLinks(const WarmLinks& links, std::vector<Vec3> ligh
   const CacheLevels& levels = scene_.levels;
   const std::size_t count = map_.size();
   // What links look up: one product instead of two values from all over the memory.
-  std::vector<Vec3> reflected(count);
+  std::vector<Vec3> reflected(count + 1);  // as cache_
   const auto reflect = [&] {
     for (const TexelMap::Substitute& s : substitutes_) light[s.texel] = light[s.source];
     parallelFor(count, kSweepGrain, [&](std::size_t first, std::size_t last) {

@@ -1,5 +1,6 @@
 #include "baker/gather_kernels.h"
 
+#include <cstring>
 #include <limits>
 
 #include "baker/sampling.h"
@@ -87,15 +88,16 @@ LUMEL_FOR_EACH_CPU FoundTexels sortFound(const RayPacket& packet, const std::arr
 
 LUMEL_FOR_EACH_CPU void lookUpLight(const FoundTexels& found, const Vec3* radiance, std::uint32_t stride,
                                     const float* pdf, Vec3Lanes& light) {
-  Vec3Lanes reflected;
-  for (std::size_t lane = 0; lane < kLanes; ++lane)
-    reflected.set(lane, radiance[std::size_t{found.texels[lane]} * stride]);
+  std::array<LaneWords, 4> columns;
+  turnRows<4>([&](std::size_t lane) { return radiance + std::size_t{found.texels[lane]} * stride; }, columns);
+  alignas(64) float reflected[3][kLanes];
+  std::memcpy(reflected, &columns, sizeof reflected);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const bool isLookedUp = (found.lookedUp & (1u << lane)) != 0;
     const float beta = kInvPi / pdf[lane];
-    light.x[lane] = pick(isLookedUp, beta * reflected.x[lane], 0.0f);
-    light.y[lane] = pick(isLookedUp, beta * reflected.y[lane], 0.0f);
-    light.z[lane] = pick(isLookedUp, beta * reflected.z[lane], 0.0f);
+    light.x[lane] = pick(isLookedUp, beta * reflected[0][lane], 0.0f);
+    light.y[lane] = pick(isLookedUp, beta * reflected[1][lane], 0.0f);
+    light.z[lane] = pick(isLookedUp, beta * reflected[2][lane], 0.0f);
   }
 }
 

@@ -90,6 +90,13 @@ class GatherTracer {
       leaveToShade(flight, hit, albedoAt(part, packet, lane, hit));
   }
 
+  /// For arriveNear, in two steps: brings closer what it will read.
+  void expectNear(const RayPacket& packet, int lane) const { transport_.rays.prefetchIndices(packet, lane); }
+  void expectNear(const RayPacket& packet, int lane, std::uint32_t texel) const {
+    transport_.rays.prefetchCorners(packet, lane);
+    if (!reflectance_.empty() && texel != kNoTexel) __builtin_prefetch(&reflectance_[texel]);
+  }
+
   /// Shades the hit on the spot, although it has a texel.
   void arriveNear(const RayPacket& packet, int lane, const Flight& flight, std::uint32_t texel) {
     const HitSurface hit = transport_.rays.surfaceAt(packet, lane);
@@ -131,14 +138,20 @@ class GatherTracer {
   void leaveToShade(const Flight& flight, const HitSurface& hit, const Vec3& albedo) {
     const float most = std::max({albedo.x, albedo.y, albedo.z});
     if (most == 0.0f) return;
-    Spot spot{flight, {hit.p, hit.ng, transport_.rays.shadingNormal(hit), transport_.rays.rayStart(hit)}};
-    spot.flight.beta *= albedo;
+    Vec3 beta = flight.beta * albedo;
     if (flight.depth >= kRouletteAfter) {
       const float survival = std::max(most, 0.05f);
       if (samplerAt(flight).get1D(flight.sample, kRoulette) >= survival) return;
-      spot.flight.beta /= survival;
+      beta /= survival;
     }
-    spots_.push_back(spot);
+    // Made in its place: a copy would wait for what was just written.
+    Spot& spot = spots_.emplace_back();
+    spot.flight = flight;
+    spot.flight.beta = beta;
+    spot.receiver.p = hit.p;
+    spot.receiver.ng = hit.ng;
+    spot.receiver.ns = transport_.rays.shadingNormal(hit);
+    spot.receiver.rayStart = transport_.rays.rayStart(hit);
   }
 
   /// The last `count` spots.

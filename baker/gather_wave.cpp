@@ -385,11 +385,19 @@ void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
       packet(0).cell = step;
       launch(packet(0));
     }
-    if (inFlight(1)) scene_.map.findPixels(packet(1).rays.packet, packet(1).lookup);
+    if (inFlight(1)) {
+      const RayPacket& rays = packet(1).rays.packet;
+      scene_.map.findPixels(rays, packet(1).lookup);
+      forEachLane(packet(1).lookup.near, [&](std::size_t lane) { tracer.expectNear(rays, static_cast<int>(lane)); });
+    }
     if (inFlight(2)) {
-      scene_.map.findTexels(packet(2).lookup);
-      for (const std::uint32_t texel : packet(2).lookup.texels)
-        if (texel != kNoTexel) sink.prefetch(texel);
+      const RayPacket& rays = packet(2).rays.packet;
+      TexelMap::Lookup& lookup = packet(2).lookup;
+      scene_.map.findTexels(lookup);
+      for (const std::uint32_t texel : lookup.texels) sink.prefetch(texel != kNoTexel ? texel : 0u);
+      forEachLane(lookup.near, [&](std::size_t lane) {
+        tracer.expectNear(rays, static_cast<int>(lane), lookup.texels[lane]);
+      });
     }
     if (!inFlight(3)) continue;
     collect(packet(3), tracer, sink);

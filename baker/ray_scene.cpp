@@ -272,6 +272,16 @@ std::array<Vec3, 3> RayScene::corners(const ScenePart& part, std::uint32_t trian
   return world;
 }
 
+void RayScene::prefetchCorners(const RayPacket& rays, int lane) const {
+  const ScenePart& part = parts_[partOf(rays, lane)];
+  const Vec3* positions = part.worldPositions ? part.worldPositions : part.primitive->positions.data();
+  const std::uint32_t* corner = indicesAt(rays, lane);
+  for (std::size_t i = 0; i < 3; ++i) {
+    __builtin_prefetch(positions + corner[i]);
+    if (!part.primitive->normals.empty()) __builtin_prefetch(part.primitive->normals.data() + corner[i]);
+  }
+}
+
 HitSurface RayScene::surfaceAt(const RayPacket& rays, int lane) const {
   const RTCHit16& hit = rays.rayhit.hit;
   HitSurface surface;

@@ -126,6 +126,10 @@ class RayScene {
     return partOfGeometry_[instance] + hit.geomID[lane];
   }
 
+  /// Brings what surfaceAt and shadingNormal will read closer, one step after the other; of no effect on results.
+  void prefetchIndices(const RayPacket& rays, int lane) const { __builtin_prefetch(indicesAt(rays, lane)); }
+  void prefetchCorners(const RayPacket& rays, int lane) const;
+
   /// Interpolated, on the side of hit.ng; hit.ng itself where the mesh has no usable normal.
   Vec3 shadingNormal(const HitSurface& hit) const;
   /// Where rays that leave the surface start.
@@ -166,6 +170,9 @@ class RayScene {
   RayScene(const Scene& scene, const Materials& materials) : scene_(&scene), materials_(&materials) {}
   Expected<void> buildGeometry();
   std::uint32_t addParts(int instance);
+  const std::uint32_t* indicesAt(const RayPacket& rays, int lane) const {
+    return parts_[partOf(rays, lane)].primitive->indices.data() + std::size_t{3} * rays.rayhit.hit.primID[lane];
+  }
   EmbreeGeometry triangles(const Primitive& primitive, const Mat4* worldFromObject, const Vec3** vertices);
   Expected<RTCScene> meshScene(int mesh);
   static void alphaFilter(const RTCFilterFunctionNArguments* args);

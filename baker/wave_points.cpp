@@ -11,6 +11,8 @@ namespace lumel {
 WavePoints::WavePoints(const RayScene& rays, const Atlas& atlas, const PageTexels& page, std::size_t first,
                        std::size_t count) {
   TexelFootprint footprint;
+  sources_.reserve(64);
+  pieces_.reserve(128);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (lane < count) {
       areas_[lane] = footprint.clip(atlas, page, first + lane);
@@ -30,31 +32,40 @@ WavePoints::WavePoints(const RayScene& rays, const Atlas& atlas, const PageTexel
     }
 }
 
+WavePoints::Source WavePoints::sourceOf(const RayScene& rays, const Surface& surface,
+                                        const TexelFootprint::Source& from) {
+  Source source{.triangle = from.triangle, .ng = from.geometricNormal};
+  std::array<Vec3, 3> corners;
+  for (std::size_t i = 0; i < 3; ++i) {
+    corners[i] = surface.positions[from.vertices[i]];
+    source.normals[i] = surface.normals[from.vertices[i]];
+    source.tangents[i] = surface.tangents[from.vertices[i]];
+  }
+  source.p0 = corners[0];
+  source.e1 = corners[1] - corners[0];
+  source.e2 = corners[2] - corners[0];
+  source.offsetMeters = offsetDistance(corners, rays.translationOf(surface.instance));
+  source.flat = source.normals[0] == source.normals[1] && source.normals[0] == source.normals[2] &&
+                source.tangents[0] == source.tangents[1] && source.tangents[0] == source.tangents[2];
+  if (source.flat) {
+    const Vec3& normal = source.normals[0];
+    const float length2 = glm::dot(normal, normal);
+    const bool isSmooth = length2 > 1e-12f && std::isfinite(length2);
+    source.frame = frameFromTangent(isSmooth ? normal / std::sqrt(length2) : source.ng, source.tangents[0]);
+  }
+  return source;
+}
+
 void WavePoints::addTexel(const RayScene& rays, const Atlas& atlas, const TexelFootprint& footprint,
                           std::size_t lane) {
   const auto firstSource = static_cast<std::uint32_t>(sources_.size());
+  const std::uint32_t firstBefore = lane > 0 ? firstSource_[lane - 1] : 0;
   for (const TexelFootprint::Source& from : footprint.sources()) {
-    const Surface& surface = atlas.surfaces[from.triangle.surface];
-    Source source{.triangle = from.triangle, .ng = from.geometricNormal};
-    std::array<Vec3, 3> corners;
-    for (std::size_t i = 0; i < 3; ++i) {
-      corners[i] = surface.positions[from.vertices[i]];
-      source.normals[i] = surface.normals[from.vertices[i]];
-      source.tangents[i] = surface.tangents[from.vertices[i]];
-    }
-    source.p0 = corners[0];
-    source.e1 = corners[1] - corners[0];
-    source.e2 = corners[2] - corners[0];
-    source.offsetMeters = offsetDistance(corners, rays.translationOf(surface.instance));
-    source.flat = source.normals[0] == source.normals[1] && source.normals[0] == source.normals[2] &&
-                  source.tangents[0] == source.tangents[1] && source.tangents[0] == source.tangents[2];
-    if (source.flat) {
-      const Vec3& normal = source.normals[0];
-      const float length2 = glm::dot(normal, normal);
-      const bool isSmooth = length2 > 1e-12f && std::isfinite(length2);
-      source.frame = frameFromTangent(isSmooth ? normal / std::sqrt(length2) : source.ng, source.tangents[0]);
-    }
-    sources_.push_back(source);
+    // Neighbours share triangles.
+    std::uint32_t known = firstBefore;
+    while (known < firstSource && !(sources_[known].triangle == from.triangle)) ++known;
+    sources_.push_back(known < firstSource ? Source(sources_[known])
+                                           : sourceOf(rays, atlas.surfaces[from.triangle.surface], from));
   }
   for (const TexelFootprint::Piece& from : footprint.pieces()) {
     const std::array<Vec2, 3>& c = from.barycentric;

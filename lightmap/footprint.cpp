@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "lightmap/raster.h"
 #include "lightmap/texels.h"
@@ -51,21 +52,6 @@ Polygon clipToTexel(const std::array<Vec2d, 3>& triangle, TexelCoord texel) {
   return polygon;
 }
 
-struct Corners {
-  std::array<Vec2d, 3> texels;
-  std::array<std::uint32_t, 3> vertices;
-};
-
-Corners cornersOf(const Atlas& atlas, const TriangleRef& ref, int width, int height) {
-  const Surface& surface = atlas.surfaces[ref.surface];
-  Corners corners;
-  for (std::size_t i = 0; i < 3; ++i) {
-    corners.vertices[i] = surface.indices[std::size_t{3} * ref.triangle + i];
-    corners.texels[i] = snapToTexelBorder(Vec2d(surface.lightmapUvs[corners.vertices[i]]) * Vec2d(width, height));
-  }
-  return corners;
-}
-
 /// Weights of vertices 1 and 2 for p, kept inside the triangle against rounding.
 Vec2 barycentricOf(const std::array<Vec2d, 3>& t, const Vec2d& p) {
   const double twiceArea = cross(t[1] - t[0], t[2] - t[0]);
@@ -109,7 +95,21 @@ Vec3 geometricNormalOf(const Surface& surface, const std::array<std::uint32_t, 3
 
 }  // namespace
 
+TexelFootprint::Source TexelFootprint::sourceOf(const TriangleRef& ref) const {
+  const Surface& surface = atlas_->surfaces[ref.surface];
+  Source source{.triangle = ref, .vertices = {}, .geometricNormal = {}, .texels = {}};
+  for (std::size_t i = 0; i < 3; ++i) {
+    source.vertices[i] = surface.indices[std::size_t{3} * ref.triangle + i];
+    source.texels[i] = snapToTexelBorder(Vec2d(surface.lightmapUvs[source.vertices[i]]) * Vec2d(width_, height_));
+  }
+  source.geometricNormal = geometricNormalOf(surface, source.vertices);
+  return source;
+}
+
 double TexelFootprint::clip(const Atlas& atlas, const PageTexels& page, std::size_t texel) {
+  // Neighbours share triangles.
+  std::swap(sources_, before_);
+  if (atlas_ != &atlas || width_ != page.width || height_ != page.height) before_.clear();
   atlas_ = &atlas;
   width_ = page.width;
   height_ = page.height;
@@ -117,18 +117,22 @@ double TexelFootprint::clip(const Atlas& atlas, const PageTexels& page, std::siz
   pieces_.clear();
   area_ = 0.0;
   for (const TriangleRef& ref : page.trianglesOf(texel)) {
-    const Corners corners = cornersOf(atlas, ref, width_, height_);
-    const Polygon polygon = clipToTexel(corners.texels, page.coords[texel]);
-    if (polygon.count < 3) continue;
+    const auto known = std::ranges::find(before_, ref, &Source::triangle);
     const auto source = static_cast<std::uint32_t>(sources_.size());
-    sources_.push_back({ref, corners.vertices, geometricNormalOf(atlas.surfaces[ref.surface], corners.vertices)});
+    sources_.push_back(known != before_.end() ? *known : sourceOf(ref));
+    const std::array<Vec2d, 3>& triangle = sources_.back().texels;
+    const Polygon polygon = clipToTexel(triangle, page.coords[texel]);
+    if (polygon.count < 3) {
+      sources_.pop_back();
+      continue;
+    }
+    std::array<Vec2, 8> barycentrics;
+    for (std::size_t i = 0; i < polygon.count; ++i) barycentrics[i] = barycentricOf(triangle, polygon.corners[i]);
     for (std::size_t i = 2; i < polygon.count; ++i) {
-      const std::array<Vec2d, 3> piece = {polygon.corners[0], polygon.corners[i - 1], polygon.corners[i]};
-      const double area = 0.5 * std::abs(cross(piece[1] - piece[0], piece[2] - piece[0]));
+      const Vec2d& first = polygon.corners[0];
+      const double area = 0.5 * std::abs(cross(polygon.corners[i - 1] - first, polygon.corners[i] - first));
       if (!(area > 0)) continue;
-      Piece added{source, {}, area_, area};
-      for (std::size_t k = 0; k < 3; ++k) added.barycentric[k] = barycentricOf(corners.texels, piece[k]);
-      pieces_.push_back(added);
+      pieces_.push_back({source, {barycentrics[0], barycentrics[i - 1], barycentrics[i]}, area_, area});
       area_ += area;
     }
   }
@@ -152,12 +156,11 @@ SurfacePoint TexelFootprint::sample(Vec2 u) const {
 SurfacePoint TexelFootprint::centroid() const {
   LUMEL_CHECK(!pieces_.empty());
   const auto texelsOf = [&](const Piece& piece) {
-    const Corners corners = cornersOf(*atlas_, sources_[piece.source].triangle, width_, height_);
+    const std::array<Vec2d, 3>& t = sources_[piece.source].texels;
     std::array<Vec2d, 3> points;
     for (std::size_t i = 0; i < 3; ++i) {
       const Vec2d w(piece.barycentric[i]);
-      points[i] = corners.texels[0] + w.x * (corners.texels[1] - corners.texels[0]) +
-                  w.y * (corners.texels[2] - corners.texels[0]);
+      points[i] = t[0] + w.x * (t[1] - t[0]) + w.y * (t[2] - t[0]);
     }
     return points;
   };
@@ -177,8 +180,7 @@ SurfacePoint TexelFootprint::centroid() const {
     nearest = &piece;
     nearestPoint = point;
   }
-  return pointOn(*nearest, barycentricOf(cornersOf(*atlas_, sources_[nearest->source].triangle, width_, height_).texels,
-                                         nearestPoint));
+  return pointOn(*nearest, barycentricOf(sources_[nearest->source].texels, nearestPoint));
 }
 
 SurfacePoint TexelFootprint::pointOn(const Piece& piece, Vec2 barycentric) const {

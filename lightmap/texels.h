@@ -14,6 +14,7 @@ namespace lumel {
 struct TriangleRef {
   std::uint32_t surface = 0;   // into Atlas::surfaces
   std::uint32_t triangle = 0;  // of that surface
+  bool operator==(const TriangleRef&) const = default;
 };
 
 struct TexelCoord {
@@ -50,13 +51,14 @@ struct SurfacePoint {
 };
 
 /// The covered part of one texel: its triangles clipped to the texel's square, as a fan of smaller triangles that can
-/// be sampled uniformly by area. Reused between texels to save allocation.
+/// be sampled uniformly by area. Reused between texels to save allocation, and between neighbours triangles.
 class TexelFootprint {
  public:
   struct Source {  // a triangle of the texel
     TriangleRef triangle;
     std::array<std::uint32_t, 3> vertices;
     Vec3 geometricNormal;
+    std::array<Vec2d, 3> texels;  // its corners on the page, snapped (raster.h)
   };
   struct Piece {
     std::uint32_t source = 0;         // into sources()
@@ -84,12 +86,14 @@ class TexelFootprint {
   std::span<const Piece> pieces() const { return pieces_; }
 
  private:
+  Source sourceOf(const TriangleRef& ref) const;
   SurfacePoint pointOn(const Piece& piece, Vec2 barycentric) const;
 
   const Atlas* atlas_ = nullptr;
   int width_ = 0;  // of the page
   int height_ = 0;
   std::vector<Source> sources_;
+  std::vector<Source> before_;  // of the texel before
   std::vector<Piece> pieces_;
   double area_ = 0.0;
 };

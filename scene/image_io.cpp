@@ -246,8 +246,10 @@ Expected<ImageWriter> ImageWriter::open(const PendingFile& file, int width, int 
   OIIO::ImageSpec spec(width, height, channels, type);
   if (!options.channelNames.empty()) spec.channelnames = options.channelNames;
   spec.attribute("oiio:UnassociatedAlpha", 1);
-  if (std::string_view(state->output->format_name()) == "openexr") spec.attribute("compression", "zip");
-  spec.attribute("png:compressionLevel", 4);  // a fifteenth larger than zlib's own choice, 6, in a quarter of its time
+  const std::string_view format = state->output->format_name();
+  if (format == "openexr") spec.attribute("compression", "zip");
+  // A fifteenth larger than zlib's own choice, 6, in a quarter of its time. Other formats may write it into their file.
+  if (format == "png") spec.attribute("png:compressionLevel", 4);
   // OpenImageIO adds the time of day where there is none, and equal images would be unequal files.
   spec.attribute("DateTime", "");
   for (const auto& [key, value] : options.metadata) spec.attribute(key, value);

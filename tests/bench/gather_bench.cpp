@@ -50,7 +50,7 @@ struct Fixture {
         scene{.transport = light, .kernels = kernels, .atlas = grid.atlas, .texels = transport.texels, .map = map} {
     scene.levels = {.count = 1, .base = 0, .endless = true};
     scene.lastDepth = 64;
-    for (std::size_t t = 0; t < map.size(); ++t) cache.emplace_back(0.1f + unitFloat(hashBits(static_cast<std::uint32_t>(t))));
+    for (std::size_t t = 0; t <= map.size(); ++t) cache.emplace_back(0.1f + unitFloat(hashBits(static_cast<std::uint32_t>(t))));
     const PageTexels& page = transport.texels[0];
     pixels.assign(static_cast<std::size_t>(page.width) * static_cast<std::size_t>(page.height), kNoTexel);
     for (std::size_t t = 0; t < page.size(); ++t) pixels[pixelOf(page.coords[t].x, page.coords[t].y)] = static_cast<std::uint32_t>(t);
