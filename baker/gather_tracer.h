@@ -87,20 +87,21 @@ class GatherTracer {
     if (texel != kNoTexel)
       sink_.texel(flight, texel);
     else if (flight.depth < lastDepth_)
-      leaveToShade(flight, hit, albedoAt(part, packet, lane, hit));
+      leaveToShade(flight, packet, lane, albedoAt(part, packet, lane, hit.point));
   }
 
-  /// For arriveNear, in two steps: brings closer what it will read.
-  void expectNear(const RayPacket& packet, int lane) const { transport_.rays.prefetchIndices(packet, lane); }
-  void expectNear(const RayPacket& packet, int lane, std::uint32_t texel) const {
+  /// In two steps: brings closer what shading the hit will read.
+  void expectSpot(const RayPacket& packet, int lane) const { transport_.rays.prefetchIndices(packet, lane); }
+  void expectSpot(const RayPacket& packet, int lane, std::uint32_t texel) const {
     transport_.rays.prefetchCorners(packet, lane);
     if (!reflectance_.empty() && texel != kNoTexel) __builtin_prefetch(&reflectance_[texel]);
   }
 
   /// Shades the hit on the spot, although it has a texel.
   void arriveNear(const RayPacket& packet, int lane, const Flight& flight, std::uint32_t texel) {
-    const HitSurface hit = transport_.rays.surfaceAt(packet, lane);
-    leaveToShade(flight, hit, reflectance_.empty() ? transport_.materials.albedo(hit.point) : reflectance_[texel]);
+    leaveToShade(flight, packet, lane,
+                 reflectance_.empty() ? transport_.materials.albedo(transport_.rays.pointAt(packet, lane))
+                                      : reflectance_[texel]);
   }
 
   /// Follows what was left to be shaded on the spot, while it fills packets.
@@ -118,7 +119,7 @@ class GatherTracer {
  private:
   struct Spot {
     Flight flight;  // beta includes the albedo
-    Receiver receiver;
+    HitCorners hit;
   };
   static constexpr int kRouletteAfter = 4;
   static constexpr std::uint32_t kDirection = kLightPatterns;
@@ -129,13 +130,13 @@ class GatherTracer {
     return {flight.key, static_cast<std::uint32_t>(flight.depth), 0u, 0u};
   }
 
-  Vec3 albedoAt(std::uint32_t part, const RayPacket& packet, int lane, const HitSurface& hit) const {
+  Vec3 albedoAt(std::uint32_t part, const RayPacket& packet, int lane, const TrianglePoint& point) const {
     if (!reflectance_.empty())
       if (const std::uint32_t texel = map_.under(part, packet, lane); texel != kNoTexel) return reflectance_[texel];
-    return transport_.materials.albedo(hit.point);
+    return transport_.materials.albedo(point);
   }
 
-  void leaveToShade(const Flight& flight, const HitSurface& hit, const Vec3& albedo) {
+  void leaveToShade(const Flight& flight, const RayPacket& packet, int lane, const Vec3& albedo) {
     const float most = std::max({albedo.x, albedo.y, albedo.z});
     if (most == 0.0f) return;
     Vec3 beta = flight.beta * albedo;
@@ -148,31 +149,25 @@ class GatherTracer {
     Spot& spot = spots_.emplace_back();
     spot.flight = flight;
     spot.flight.beta = beta;
-    spot.receiver.p = hit.p;
-    spot.receiver.ng = hit.ng;
-    spot.receiver.ns = transport_.rays.shadingNormal(hit);
-    spot.receiver.rayStart = transport_.rays.rayStart(hit);
+    transport_.rays.cornersAt(packet, lane, spot.hit);
   }
 
   /// The last `count` spots.
   void shade(std::size_t count) {
-    LaneFlags active{};
-    Vec3Lanes p, ng, ns, rayStart;
+    HitCornerLanes hits;
     SampleLanes samples;
     std::array<Flight, kLanes> flights;
     for (std::size_t lane = 0; lane < count; ++lane) {
       const Spot& spot = spots_[spots_.size() - count + lane];
-      active[lane] = 1;
-      p.set(lane, spot.receiver.p);
-      ng.set(lane, spot.receiver.ng);
-      ns.set(lane, spot.receiver.ns);
-      rayStart.set(lane, spot.receiver.rayStart);
+      transport_.rays.set(hits, lane, spot.hit);
       flights[lane] = spot.flight;
       samples.setTexel(static_cast<int>(lane), samplerAt(spot.flight));
       samples.setSample(static_cast<int>(lane), spot.flight.sample);
     }
     spots_.resize(spots_.size() - count);
-    const ReceiverLanes receivers{active, p, ng, ns, rayStart};
+    Vec3Lanes p, ng, ns, rayStart;
+    receiveAt(hits, p, ng, ns, rayStart);
+    const ReceiverLanes receivers{hits.active, p, ng, ns, rayStart};
     shadowRays_ += directLight(transport_, receivers, samples, 0, TraceMode::Packet, kCosineDensity,
                                [&](int lane, const Vec3& wi, const Vec3& light) {
                                  const auto l = static_cast<std::size_t>(lane);

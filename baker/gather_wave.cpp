@@ -388,15 +388,15 @@ void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
     if (inFlight(1)) {
       const RayPacket& rays = packet(1).rays.packet;
       scene_.map.findPixels(rays, packet(1).lookup);
-      forEachLane(packet(1).lookup.near, [&](std::size_t lane) { tracer.expectNear(rays, static_cast<int>(lane)); });
+      forEachLane(packet(1).lookup.onTheSpot, [&](std::size_t lane) { tracer.expectSpot(rays, static_cast<int>(lane)); });
     }
     if (inFlight(2)) {
       const RayPacket& rays = packet(2).rays.packet;
       TexelMap::Lookup& lookup = packet(2).lookup;
       scene_.map.findTexels(lookup);
       for (const std::uint32_t texel : lookup.texels) sink.prefetch(texel != kNoTexel ? texel : 0u);
-      forEachLane(lookup.near, [&](std::size_t lane) {
-        tracer.expectNear(rays, static_cast<int>(lane), lookup.texels[lane]);
+      forEachLane(lookup.onTheSpot, [&](std::size_t lane) {
+        tracer.expectSpot(rays, static_cast<int>(lane), lookup.texels[lane]);
       });
     }
     if (!inFlight(3)) continue;
@@ -428,7 +428,7 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
   const AimedRays& rays = packet.rays;
   const TexelMap::Lookup& lookup = packet.lookup;
   const int level = scene_.levels.read(scene_.bounces, 0);
-  const FoundTexels found = sortFound(rays.packet, lookup.texels, level >= 0 ? lookup.near : 0u);
+  const FoundTexels found = sortFound(rays.packet, lookup.texels, level >= 0 ? lookup.onTheSpot : 0u);
   sink.result.rays += static_cast<std::uint64_t>(std::popcount(found.lookedUp | found.others | found.missed));
   Vec3Lanes light;
   if (level >= 0)

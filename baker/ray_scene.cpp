@@ -282,13 +282,67 @@ void RayScene::prefetchCorners(const RayPacket& rays, int lane) const {
   }
 }
 
+void RayScene::cornersAt(const RayPacket& rays, int lane, HitCorners& hit) const {
+  hit.part = partOf(rays, lane);
+  const ScenePart& part = parts_[hit.part];
+  hit.corners = corners(part, rays.rayhit.hit.primID[lane]);
+  const std::vector<Vec3>& normals = part.primitive->normals;
+  const std::uint32_t* index = indicesAt(rays, lane);
+  for (std::size_t i = 0; i < 3; ++i) hit.normals[i] = normals.empty() ? Vec3(0.0f) : normals[index[i]];
+  hit.weights = {rays.rayhit.hit.u[lane], rays.rayhit.hit.v[lane]};
+  hit.dir = rays.direction(lane);
+}
+
+void RayScene::set(HitCornerLanes& lanes, std::size_t lane, const HitCorners& hit) const {
+  const ScenePart& part = parts_[hit.part];
+  lanes.active[lane] = 1;
+  for (std::size_t i = 0; i < 3; ++i) {
+    lanes.corners[i].set(lane, hit.corners[i]);
+    lanes.normals[i].set(lane, hit.normals[i]);
+    lanes.worldFromNormal[i].set(lane, part.worldFromNormal[static_cast<int>(i)]);
+  }
+  lanes.dir.set(lane, hit.dir);
+  lanes.u[lane] = hit.weights.x;
+  lanes.v[lane] = hit.weights.y;
+  lanes.frontSign[lane] = part.frontSign;
+  lanes.translation[lane] = part.translation;
+}
+
+LUMEL_FOR_EACH_CPU void receiveAt(const HitCornerLanes& hits, Vec3Lanes& p, Vec3Lanes& ng, Vec3Lanes& ns,
+                                  Vec3Lanes& rayStart) {
+  constexpr float kMostFinite = std::numeric_limits<float>::max();
+#pragma GCC ivdep
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const bool active = hits.active[lane] != 0;
+    const std::array<Vec3, 3> corners = {hits.corners[0][lane], hits.corners[1][lane], hits.corners[2][lane]};
+    const float u = hits.u[lane], v = hits.v[lane];
+    const Vec3 e1 = corners[1] - corners[0];
+    const Vec3 e2 = corners[2] - corners[0];
+    const Vec3 at = corners[0] + u * e1 + v * e2;
+    const Vec3 front = glm::normalize(glm::cross(e1, e2) * hits.frontSign[lane]);
+    const Vec3 facing = pick(glm::dot(hits.dir[lane], front) > 0.0f, -front, front);
+    const Vec3 own = (1.0f - u - v) * hits.normals[0][lane] + u * hits.normals[1][lane] + v * hits.normals[2][lane];
+    const Vec3 n = hits.worldFromNormal[0][lane] * own.x + hits.worldFromNormal[1][lane] * own.y +
+                   hits.worldFromNormal[2][lane] * own.z;
+    const float length2 = glm::dot(n, n);
+    const bool isSmooth = (length2 > 0.0f) & (length2 <= kMostFinite);
+    const Vec3 unit = n / std::sqrt(pick(isSmooth, length2, 1.0f));
+    const Vec3 turned = pick(glm::dot(unit, facing) < 0.0f, -unit, unit);
+    const Vec3 start = offsetPoint(at, facing, corners, hits.translation[lane]);
+    p.set(lane, pick(active, at, Vec3(0.0f)));
+    ng.set(lane, pick(active, facing, Vec3(0.0f)));
+    ns.set(lane, pick(active, pick(isSmooth, turned, facing), Vec3(0.0f)));
+    rayStart.set(lane, pick(active, start, Vec3(0.0f)));
+  }
+}
+
 HitSurface RayScene::surfaceAt(const RayPacket& rays, int lane) const {
   const RTCHit16& hit = rays.rayhit.hit;
   HitSurface surface;
   surface.part = partOf(rays, lane);
   const ScenePart& part = parts_[surface.part];
   surface.material = part.primitive->material;
-  surface.point = {part.primitive, hit.primID[lane], {hit.u[lane], hit.v[lane]}};
+  surface.point = pointAt(rays, lane);
   surface.corners = corners(part, hit.primID[lane]);
   const Vec3 e1 = surface.corners[1] - surface.corners[0];
   const Vec3 e2 = surface.corners[2] - surface.corners[0];

@@ -80,6 +80,32 @@ struct HitSurface {
   std::array<Vec3, 3> corners;  // of the triangle, world
 };
 
+/// What a receiver at a hit is made of.
+struct HitCorners {
+  std::array<Vec3, 3> corners;  // of the triangle, world
+  std::array<Vec3, 3> normals;  // of its vertices, as the primitive has them; zero where it has none
+  Vec2 weights;                 // of vertices 1 and 2
+  Vec3 dir;                     // of the ray
+  std::uint32_t part = 0;
+};
+
+/// The same by lane, with what is needed of the part.
+struct HitCornerLanes {
+  LaneFlags active{};
+  std::array<Vec3Lanes, 3> corners;
+  std::array<Vec3Lanes, 3> normals;
+  Vec3Lanes dir;
+  alignas(64) float u[kLanes] = {};
+  alignas(64) float v[kLanes] = {};
+  std::array<Vec3Lanes, 3> worldFromNormal;  // columns
+  alignas(64) float frontSign[kLanes] = {};
+  alignas(64) float translation[kLanes] = {};
+};
+
+/// Hits as points that receive light: what RayScene::surfaceAt, shadingNormal and rayStart find, to the last bit. Zeros
+/// where no lane is active.
+void receiveAt(const HitCornerLanes& hits, Vec3Lanes& p, Vec3Lanes& ng, Vec3Lanes& ns, Vec3Lanes& rayStart);
+
 /// How far rays start off a triangle: a few units in the last place of the largest coordinate that takes part in
 /// finding a point of it (after Waechter and Binder 2019; without their fixed distance near the origin, so that scenes
 /// of any size work). `translation`: largest coordinate of the instance's translation, for geometry that Embree places
@@ -126,7 +152,14 @@ class RayScene {
     return partOfGeometry_[instance] + hit.geomID[lane];
   }
 
-  /// Brings what surfaceAt and shadingNormal will read closer, one step after the other; of no effect on results.
+  /// For receiveAt. Precondition: rays.hit(lane).
+  void cornersAt(const RayPacket& rays, int lane, HitCorners& hit) const;
+  void set(HitCornerLanes& lanes, std::size_t lane, const HitCorners& hit) const;
+  TrianglePoint pointAt(const RayPacket& rays, int lane) const {
+    const RTCHit16& hit = rays.rayhit.hit;
+    return {parts_[partOf(rays, lane)].primitive, hit.primID[lane], {hit.u[lane], hit.v[lane]}};
+  }
+  /// Brings what these and surfaceAt will read closer, one step after the other; of no effect on results.
   void prefetchIndices(const RayPacket& rays, int lane) const { __builtin_prefetch(indicesAt(rays, lane)); }
   void prefetchCorners(const RayPacket& rays, int lane) const;
 

@@ -217,7 +217,7 @@ LUMEL_FOR_EACH_CPU void TexelMap::placePixels(const RayPacket& packet, const Tri
   alignas(64) std::uint32_t firstTile[kLanes];
   std::memcpy(of, &columns, sizeof of);
   std::memcpy(firstTile, &columns[6], sizeof firstTile);
-  std::uint32_t near = 0;
+  std::uint32_t onTheSpot = 0;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const bool isFound = lookup.triangles[lane] != kNowhere;
     const float u = pick(isFound, packet.rayhit.hit.u[lane], 0.0f), v = pick(isFound, packet.rayhit.hit.v[lane], 0.0f);
@@ -228,11 +228,13 @@ LUMEL_FOR_EACH_CPU void TexelMap::placePixels(const RayPacket& packet, const Tri
     const auto row = static_cast<std::uint32_t>(std::max(static_cast<int>(y), 0));
     lookup.x[lane] = x;
     lookup.y[lane] = y;
-    near |= packet.rayhit.ray.tfar[lane] < Lookup::kNearTexels * of[7][lane] ? 1u << lane : 0u;
+    const bool isHit = (packet.valid[lane] != 0) & (packet.rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID);
+    const bool isNear = packet.rayhit.ray.tfar[lane] < Lookup::kNearTexels * of[7][lane];
+    onTheSpot |= isHit & (isNear | !isFound) ? 1u << lane : 0u;
     lookup.bits[lane] = tileBit(column, row);
     lookup.tiles[lane] = firstTile[lane] + row / 4 * tilesAcross + column / 4;
   }
-  lookup.near = near;
+  lookup.onTheSpot = onTheSpot;
 }
 
 void TexelMap::findPixels(const RayPacket& packet, Lookup& lookup) const {

@@ -116,8 +116,9 @@ class TexelMap {
 
 struct TexelMap::Lookup {
   alignas(64) std::array<std::uint32_t, kLanes> texels;
-  /// Which rays are shorter than kNearTexels texels of what they hit: one value for a whole texel is then too coarse.
-  std::uint32_t near;  // bits of lanes
+  /// Bits of the lanes whose hit is to be shaded on the spot: it has no texel, or the ray is shorter than kNearTexels
+  /// texels of what it hit, and one value for a whole texel too coarse.
+  std::uint32_t onTheSpot;
   static constexpr float kNearTexels = 1.5f;
 
  private:
