@@ -377,7 +377,8 @@ void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
   net_.fill(samplers_, covered_, net, kDirection);
   GatherTracer tracer(scene_.transport, scene_.map, scene_.reflectance, scene_.lastDepth, sink);
   const std::uint32_t count = net.count();
-  // While one packet is traced, memory is asked for what those before it hit.
+  // While one packet is traced, memory is asked for what those before it hit. What is there already is read first: it
+  // would wait behind what is asked for.
   for (std::uint32_t step = 0; step < count + kInFlight - 1; ++step) {
     const auto packet = [&](std::uint32_t age) -> Packet& { return packets_[(step - age) % kInFlight]; };
     const auto inFlight = [&](std::uint32_t age) { return step >= age && step - age < count; };
@@ -385,25 +386,17 @@ void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
       packet(0).cell = step;
       launch(packet(0));
     }
-    if (inFlight(1)) {
-      const RayPacket& rays = packet(1).rays.packet;
-      scene_.map.findPixels(rays, packet(1).lookup);
-      forEachLane(packet(1).lookup.onTheSpot, [&](std::size_t lane) { tracer.expectSpot(rays, static_cast<int>(lane)); });
+    if (inFlight(3)) {
+      collect(packet(3), tracer, sink);
+      tracer.shadeFull();
+      // Sums of a few samples lose nothing as floats.
+      if ((packet(3).cell & 15u) == 15u) settle(sink.sums, sink.totals);
     }
-    if (inFlight(2)) {
-      const RayPacket& rays = packet(2).rays.packet;
-      TexelMap::Lookup& lookup = packet(2).lookup;
-      scene_.map.findTexels(lookup);
-      for (const std::uint32_t texel : lookup.texels) sink.prefetch(texel != kNoTexel ? texel : 0u);
-      forEachLane(lookup.onTheSpot, [&](std::size_t lane) {
-        tracer.expectSpot(rays, static_cast<int>(lane), lookup.texels[lane]);
-      });
-    }
-    if (!inFlight(3)) continue;
-    collect(packet(3), tracer, sink);
-    tracer.shadeFull();
-    // Sums of a few samples lose nothing as floats.
-    if ((packet(3).cell & 15u) == 15u) settle(sink.sums, sink.totals);
+    if (inFlight(2)) scene_.map.findTexels(packet(2).lookup);
+    if (inFlight(1)) scene_.map.findPixels(packet(1).rays.packet, packet(1).lookup);
+    if (inFlight(0)) scene_.map.findTriangles(packet(0).rays.packet, packet(0).lookup);
+    if (inFlight(1)) expectSpots(packet(1), tracer);
+    if (inFlight(2)) expectLight(packet(2), tracer, sink);
   }
   tracer.finish();
   sink.judgePoints(net);
@@ -421,7 +414,19 @@ void GatherWave::launch(Packet& packet) {
   aimGatherRays(net_.x(packet.cell), net_.y(packet.cell), points_[pointOf(packet.cell)], packet.rays);
   scene_.transport.rays.intersect(packet.rays.packet, scene_.gatherMode.value_or(pilot_.mode()));
   pilot_.see(packet.rays.packet);
-  scene_.map.findTriangles(packet.rays.packet, packet.lookup);
+}
+
+/// Asks memory for what collect() will read of a packet whose triangles are found, and then whose texels are.
+void GatherWave::expectSpots(const Packet& packet, const GatherTracer<GatherSink>& tracer) {
+  forEachLane(packet.lookup.onTheSpot,
+              [&](std::size_t lane) { tracer.expectSpot(packet.rays.packet, static_cast<int>(lane)); });
+}
+void GatherWave::expectLight(const Packet& packet, const GatherTracer<GatherSink>& tracer, const GatherSink& sink) {
+  const TexelMap::Lookup& lookup = packet.lookup;
+  for (const std::uint32_t texel : lookup.texels) sink.prefetch(texel != kNoTexel ? texel : 0u);
+  forEachLane(lookup.onTheSpot, [&](std::size_t lane) {
+    tracer.expectSpot(packet.rays.packet, static_cast<int>(lane), lookup.texels[lane]);
+  });
 }
 
 void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer, GatherSink& sink) const {

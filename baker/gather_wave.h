@@ -146,6 +146,8 @@ class GatherWave {
     TexelMap::Lookup lookup;
   };
   void launch(Packet& packet);
+  static void expectSpots(const Packet& packet, const GatherTracer<GatherSink>& tracer);
+  static void expectLight(const Packet& packet, const GatherTracer<GatherSink>& tracer, const GatherSink& sink);
   void collect(const Packet& packet, GatherTracer<GatherSink>& tracer, GatherSink& sink) const;
   void collectSky(const AimedRays& rays, std::uint32_t lanes, Vec3Lanes& light, GatherSink& sink) const;
 
