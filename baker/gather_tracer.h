@@ -157,13 +157,16 @@ class GatherTracer {
     HitCornerLanes hits;
     SampleLanes samples;
     std::array<Flight, kLanes> flights;
+    std::array<std::uint32_t, kLanes> keys{}, depths{};
     for (std::size_t lane = 0; lane < count; ++lane) {
       const Spot& spot = spots_[spots_.size() - count + lane];
       transport_.rays.set(hits, lane, spot.hit);
       flights[lane] = spot.flight;
-      samples.setTexel(static_cast<int>(lane), samplerAt(spot.flight));
+      keys[lane] = spot.flight.key;
+      depths[lane] = static_cast<std::uint32_t>(spot.flight.depth);
       samples.setSample(static_cast<int>(lane), spot.flight.sample);
     }
+    samples.setTexels(keys.data(), depths.data());  // as samplerAt
     spots_.resize(spots_.size() - count);
     Vec3Lanes p, ng, ns, rayStart;
     receiveAt(hits, p, ng, ns, rayStart);

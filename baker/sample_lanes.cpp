@@ -17,7 +17,14 @@ LUMEL_FOR_EACH_CPU void drawLanes2D(const std::uint32_t* seeds, const std::uint3
   }
 }
 
+LUMEL_FOR_EACH_CPU void seedLanes(const std::uint32_t* keys, const std::uint32_t* depths, std::uint32_t* seeds) {
+#pragma GCC ivdep
+  for (int lane = 0; lane < kLanes; ++lane) seeds[lane] = TexelSampler(keys[lane], depths[lane], 0u, 0u).seed();
+}
+
 }  // namespace
+
+void SampleLanes::setTexels(const std::uint32_t* keys, const std::uint32_t* depths) { seedLanes(keys, depths, seeds_); }
 
 UnitLanes SampleLanes::draw1D(std::uint32_t pattern) const {
   UnitLanes lanes;

@@ -24,6 +24,8 @@ struct UnitSquareLanes {
 class SampleLanes {
  public:
   void setTexel(int lane, const TexelSampler& sampler) { seeds_[lane] = sampler.seed(); }
+  /// TexelSampler(keys[lane], depths[lane], 0, 0) for all lanes.
+  void setTexels(const std::uint32_t* keys, const std::uint32_t* depths);
   void setSample(int lane, std::uint32_t index) { samples_[lane] = index; }
   void setSampleOfAll(std::uint32_t index) {
     for (std::uint32_t& s : samples_) s = index;

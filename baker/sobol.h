@@ -61,11 +61,14 @@ inline float unitFloat(std::uint32_t x) { return static_cast<float>(x >> 8) * 0x
 
 /// One Owen-scrambled, index-shuffled (0, 2)-sequence: every aligned block of 2^m indices is a (0, m, 2)-net.
 /// Different seeds give independent scrambles, so patterns can be padded to any dimension.
-inline Vec2 sobol2D(std::uint32_t index, std::uint32_t seed) {
-  const std::uint32_t shuffled = reverseBits(laineKarrasPermutation(reverseBits(index), hashBits(seed ^ 0xa511e9b3u)));
+/// `reversedIndex`: reverseBits of the point's index.
+inline Vec2 sobol2DOfReversed(std::uint32_t reversedIndex, std::uint32_t seed) {
+  const std::uint32_t shuffled = reverseBits(laineKarrasPermutation(reversedIndex, hashBits(seed ^ 0xa511e9b3u)));
   return {unitFloat(reverseBits(laineKarrasPermutation(shuffled, hashBits(seed ^ 0x63d83595u)))),
           unitFloat(reverseBits(laineKarrasPermutation(sobolSecondReversed(shuffled), hashBits(seed ^ 0x1b873593u))))};
 }
+
+inline Vec2 sobol2D(std::uint32_t index, std::uint32_t seed) { return sobol2DOfReversed(reverseBits(index), seed); }
 
 /// The same in one dimension: every aligned block of 2^m indices has one point in each interval of length 2^-m.
 inline float sobol1D(std::uint32_t index, std::uint32_t seed) {

@@ -14,16 +14,17 @@ inline std::uint32_t mortonCode(std::uint32_t x, std::uint32_t y) {
 }
 
 struct RawNet {
+  std::array<std::uint32_t, kMostNetPoints> reversedIndex;
   std::array<float, kMostNetPoints> x;
   std::array<float, kMostNetPoints> y;
   std::array<std::uint32_t, kMostNetPoints> cell;
 };
 
-LUMEL_FOR_EACH_CPU void drawNet(std::uint32_t seed, std::uint32_t first, std::uint32_t count, int bitsX, int bitsY, RawNet& net) {
+LUMEL_FOR_EACH_CPU void drawNet(std::uint32_t seed, std::uint32_t count, int bitsX, int bitsY, RawNet& net) {
   const auto cellsX = static_cast<float>(1 << bitsX);
   const auto cellsY = static_cast<float>(1 << bitsY);
   for (std::uint32_t i = 0; i < count; ++i) {
-    const Vec2 u = sobol2D(first + i, seed);
+    const Vec2 u = sobol2DOfReversed(net.reversedIndex[i], seed);
     net.x[i] = u.x;
     net.y[i] = u.y;
     net.cell[i] = mortonCode(static_cast<std::uint32_t>(static_cast<int>(u.x * cellsX)),
@@ -37,6 +38,7 @@ void NetLanes::fill(const std::array<TexelSampler, kLanes>& samplers, const std:
                     const NetRange& net, std::uint32_t pattern) {
   first_ = net.first;
   RawNet raw;
+  for (std::uint32_t i = 0; i < net.count(); ++i) raw.reversedIndex[i] = reverseBits(net.first + i);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (!active[lane]) {
       for (std::size_t at = lane; at < std::size_t{net.count()} * kLanes; at += kLanes) {
@@ -45,7 +47,7 @@ void NetLanes::fill(const std::array<TexelSampler, kLanes>& samplers, const std:
       }
       continue;
     }
-    drawNet(samplers[lane].seedOf(pattern), net.first, net.count(), (net.log2Count + 1) / 2, net.log2Count / 2, raw);
+    drawNet(samplers[lane].seedOf(pattern), net.count(), (net.log2Count + 1) / 2, net.log2Count / 2, raw);
     for (std::uint32_t i = 0; i < net.count(); ++i) {
       const std::size_t at = std::size_t{raw.cell[i]} * kLanes + lane;
       x_[at] = raw.x[i];
