@@ -169,6 +169,50 @@ TEST(RayScene, InstancesAnswerAsFlattenedGeometryDoes) {
   EXPECT_GT(hits, 500);
 }
 
+TEST(RayScene, ReceiversByLaneAreThoseOfSingleHits) {
+  TestScene test;
+  test.addRectangle({-1, 0, -1}, {2, 0, 0}, {0, 2, 0.5f});
+  // Bent normals, and some that are of no use.
+  auto& normals = test.scene.meshes[0].primitives[0].normals;
+  for (std::size_t i = 0; i < normals.size(); ++i)
+    normals[i] = i == 0 ? Vec3(0.0f) : normals[i] + 0.3f * randomDirection(static_cast<std::uint32_t>(i), 4);
+  test.scene.instances[0].worldFromObject =
+      Mat4(Vec4(0, 2, 0, 0), Vec4(-0.5f, 0, 0, 0), Vec4(0, 0, -1, 0), Vec4(3, 1, -2, 1));
+  test.addInstance(0, Mat4(Vec4(1, 0, 0, 0), Vec4(0, 1, 0, 0), Vec4(0, 0, 1, 0), Vec4(3, 1, -1, 1)));
+  const Built built(test.scene);
+  int hits = 0;
+  for (std::uint32_t i = 0; i < 4096; i += kLanes) {
+    RayPacket rays;
+    for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
+      const Vec3 dir = randomDirection(i + lane, 8);
+      rays.set(static_cast<int>(lane), Vec3(3, 1, -2) - 5.0f * dir + Vec3(sobol2D(i, 2), 0), dir);
+    }
+    built.rays->intersect(rays, TraceMode::Packet);
+    HitCornerLanes lanes;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      if (!rays.hit(lane)) continue;
+      HitCorners corners;
+      built.rays->cornersAt(rays, lane, corners);
+      built.rays->set(lanes, static_cast<std::size_t>(lane), corners);
+    }
+    Vec3Lanes p, ng, ns, rayStart;
+    receiveAt(lanes, p, ng, ns, rayStart);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      if (!rays.hit(static_cast<int>(lane))) {
+        EXPECT_EQ(ng[lane], Vec3(0.0f));
+        continue;
+      }
+      ++hits;
+      const HitSurface hit = built.rays->surfaceAt(rays, static_cast<int>(lane));
+      EXPECT_EQ(p[lane], hit.p);
+      EXPECT_EQ(ng[lane], hit.ng);
+      EXPECT_EQ(ns[lane], built.rays->shadingNormal(hit));
+      EXPECT_EQ(rayStart[lane], built.rays->rayStart(hit));
+    }
+  }
+  EXPECT_GT(hits, 500);
+}
+
 /// A closed sphere-like shell of triangles that share edges and vertices, at a place and a size.
 Scene shell(const Vec3& centre, float radius, int rings) {
   Scene scene;

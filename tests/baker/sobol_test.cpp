@@ -111,5 +111,19 @@ TEST(SampleLanes, DrawWhatEachTexelDraws) {
   }
 }
 
+TEST(SampleLanes, SeedsOfHitsAreThoseOfTheirSamplers) {
+  std::array<std::uint32_t, kLanes> keys{}, depths{};
+  for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
+    keys[lane] = hashBits(lane);
+    depths[lane] = lane / 4;
+  }
+  SampleLanes lanes;
+  lanes.setTexels(keys.data(), depths.data());
+  lanes.setSampleOfAll(7);
+  const UnitLanes line = lanes.draw1D(2);
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    EXPECT_EQ(line.u[lane], TexelSampler(keys[lane], depths[lane], 0, 0).get1D(7, 2));
+}
+
 }  // namespace
 }  // namespace lumel

@@ -35,7 +35,7 @@ struct Mapped {
 };
 
 // Pages whose sides are no multiples of a tile, the second with half of its texels; from above, from below and past.
-TEST(TexelMap, FindsTheTexelUnderAHit) {
+void expectTexelsUnderHits(bool placedByEmbree) {
   TestScene test;
   test.addRectangle({0, 0, 0}, {0, 0, 10}, {10, 0, 0}, {.texels = 10});              // faces +y
   test.addRectangle({20, 0, 0}, {0, 0, 7}, {7, 0, 0}, {.texels = 7, .flip = true});  // mirrored
@@ -43,7 +43,10 @@ TEST(TexelMap, FindsTheTexelUnderAHit) {
   test.atlas.surfaces[1].sourceTriangle.resize(1);
   test.atlas.surfaces[1].charts.resize(1);
   test.addRectangle({40, 0, 0}, {0, 0, 5}, {5, 0, 0}, {.texels = 0});
+  if (placedByEmbree)
+    for (const int instance : {0, 1, 2}) test.addInstance(instance, glm::translate(Mat4(1.0f), Vec3(0, 0, 1000)));
   const Mapped mapped(test);
+  ASSERT_EQ(mapped.rays->placesInstances(), placedByEmbree);
   ASSERT_LT(mapped.texels[1].size(), 40u);
   std::map<std::string, int> seen;
   for (std::uint32_t p = 0; p < 200; ++p) {
@@ -80,6 +83,9 @@ TEST(TexelMap, FindsTheTexelUnderAHit) {
   }
   for (const char* kind : {"first", "second", "back", "none", "miss"}) EXPECT_GT(seen[kind], 20) << kind;
 }
+
+TEST(TexelMap, FindsTheTexelUnderAHit) { expectTexelsUnderHits(false); }
+TEST(TexelMap, FindsTheTexelUnderAHitOnAnInstance) { expectTexelsUnderHits(true); }
 
 TEST(TexelMap, SubstitutesAreTheNearestOfTheChart) {
   TestScene test;

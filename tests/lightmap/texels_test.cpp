@@ -160,6 +160,23 @@ TEST(FindTexels, RoundingToFloatAddsNoTexels) {
   }
 }
 
+TEST(Footprint, NeighboursDoNotChangeIt) {
+  const Atlas atlas = atlasOf(randomTriangles(60, 40, 1), 40, 37);
+  const Atlas other = atlasOf(randomTriangles(60, 40, 2), 40, 37);
+  const PageTexels page = findTexels(atlas)[0], otherPage = findTexels(other)[0];
+  TexelFootprint reused;
+  for (std::size_t i = 0; i < page.size(); ++i) {
+    if (i % 50 == 0 && i < otherPage.size()) reused.clip(other, otherPage, i);
+    TexelFootprint fresh;
+    EXPECT_EQ(reused.clip(atlas, page, i), fresh.clip(atlas, page, i));
+    ASSERT_EQ(reused.pieces().size(), fresh.pieces().size());
+    if (fresh.area() > 0) {
+      EXPECT_EQ(reused.sample({0.3f, 0.6f}).position, fresh.sample({0.3f, 0.6f}).position);
+      EXPECT_EQ(reused.centroid().geometricNormal, fresh.centroid().geometricNormal);
+    }
+  }
+}
+
 TEST(Footprint, AreasSumToTheTriangle) {
   const auto triangles = randomTriangles(40, 16, 4);
   for (const auto& triangle : triangles) {
