@@ -223,13 +223,12 @@ void GatherWave::warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave&
   for (std::uint32_t s = 0; s < kWarmLights; ++s) {
     const ReceiverLanes receivers = points_[s].receivers();
     lightSamples_.setSampleOfAll(s);
-    counts.shadowRays +=
-        directLight(scene_.transport, receivers, lightSamples_, 0, TraceMode::Packet, kGatherDensity,
-                    [&](int lane, const Vec3& wi, const Vec3& light) {
-                      const auto l = static_cast<std::size_t>(lane);
-                      const Vec3 flat = light * (glm::dot(wi, receivers.ns[l]) * kInvPi);
-                      if (isFinite(flat)) texels[l].direct += flat / static_cast<float>(kWarmLights);
-                    });
+    counts.shadowRays += directLight(scene_.transport, receivers, lightSamples_, 0, TraceMode::Packet, kGatherDensity,
+                                     [&](int lane, const Vec3& wi, const Vec3& light) {
+                                       const auto l = static_cast<std::size_t>(lane);
+                                       const Vec3 flat = light * (glm::dot(wi, receivers.ns[l]) * kInvPi);
+                                       if (isFinite(flat)) texels[l].direct += flat / static_cast<float>(kWarmLights);
+                                     });
   }
 }
 

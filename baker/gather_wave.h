@@ -100,10 +100,10 @@ Vec3 unpackWeight(std::uint32_t packed);
 
 /// The start of the cache at one texel.
 struct WarmTexel {
-  Vec3 reflectance{0};  // mean over the texel
-  Vec3 direct{0};       // irradiance / pi from light samples
-  Vec3 seen{0};         // the same from what rays see shine by itself
-  Vec3 relit{0};        // the same from hits without texels: light of one bounce and more
+  Vec3 reflectance{0};      // mean over the texel
+  Vec3 direct{0};           // irradiance / pi from light samples
+  Vec3 seen{0};             // the same from what rays see shine by itself
+  Vec3 relit{0};            // the same from hits without texels: light of one bounce and more
   std::uint32_t backs = 0;  // bits of the rays that met backs
 };
 

@@ -76,8 +76,7 @@ TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<P
     }
   }
 
-  for (const ScenePart& part : rays.parts())
-    lookedUp_.push_back({.frontSign = part.frontSign});
+  for (const ScenePart& part : rays.parts()) lookedUp_.push_back({.frontSign = part.frontSign});
   lookedUp_.emplace_back();
   firstTriangle_.resize(rays.parts().size(), kNowhere);
   triangles_.emplace_back();

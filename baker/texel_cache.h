@@ -61,7 +61,7 @@ class TexelMap {
 
  private:
   struct alignas(32) Triangle {
-    Vec2 pixel{0}, perU{0}, perV{0};    // on the page: of the first corner, and how it moves with the barycentrics
+    Vec2 pixel{0}, perU{0}, perV{0};     // on the page: of the first corner, and how it moves with the barycentrics
     std::uint32_t firstTile = kNowhere;  // of the page
     float texelMeters = 0.0f;            // width of a texel on the surface
 

@@ -8,28 +8,8 @@
 
 namespace lumel {
 
-/// Brings closer what the footprints of texels [first, first + count) are made of.
-static void prefetchCorners(const Atlas& atlas, const PageTexels& page, std::size_t first, std::size_t count) {
-  const std::span triangles = std::span(page.triangles)
-                                  .subspan(page.firstTriangle[first],
-                                           page.firstTriangle[first + count] - page.firstTriangle[first]);
-  for (const TriangleRef& ref : triangles)
-    __builtin_prefetch(atlas.surfaces[ref.surface].indices.data() + std::size_t{3} * ref.triangle);
-  for (const TriangleRef& ref : triangles) {
-    const Surface& surface = atlas.surfaces[ref.surface];
-    for (std::size_t i = 0; i < 3; ++i) {
-      const std::uint32_t vertex = surface.indices[std::size_t{3} * ref.triangle + i];
-      __builtin_prefetch(surface.lightmapUvs.data() + vertex);
-      __builtin_prefetch(surface.positions.data() + vertex);
-      __builtin_prefetch(surface.normals.data() + vertex);
-      __builtin_prefetch(surface.tangents.data() + vertex);
-    }
-  }
-}
-
 WavePoints::WavePoints(const RayScene& rays, const Atlas& atlas, const PageTexels& page, std::size_t first,
                        std::size_t count) {
-  prefetchCorners(atlas, page, first, count);
   TexelFootprint footprint;
   sources_.reserve(64);
   pieces_.reserve(128);
@@ -76,8 +56,7 @@ WavePoints::Source WavePoints::sourceOf(const RayScene& rays, const Surface& sur
   return source;
 }
 
-void WavePoints::addTexel(const RayScene& rays, const Atlas& atlas, const TexelFootprint& footprint,
-                          std::size_t lane) {
+void WavePoints::addTexel(const RayScene& rays, const Atlas& atlas, const TexelFootprint& footprint, std::size_t lane) {
   const auto firstSource = static_cast<std::uint32_t>(sources_.size());
   const std::uint32_t firstBefore = lane > 0 ? firstSource_[lane - 1] : 0;
   for (const TexelFootprint::Source& from : footprint.sources()) {

@@ -99,7 +99,8 @@ class WavePoints {
   static Source sourceOf(const RayScene& rays, const Surface& surface, const TexelFootprint::Source& from);
   void addTexel(const RayScene& rays, const Atlas& atlas, const TexelFootprint& footprint, std::size_t lane);
   bool turns(std::size_t lane) const;
-  static void choose(std::span<const Piece> pieces, float area, std::uint32_t seed, std::uint32_t first, Places& places);
+  static void choose(std::span<const Piece> pieces, float area, std::uint32_t seed, std::uint32_t first,
+                     Places& places);
   static void locate(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
   static void locateFrames(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
 

@@ -50,13 +50,16 @@ struct Fixture {
         scene{.transport = light, .kernels = kernels, .atlas = grid.atlas, .texels = transport.texels, .map = map} {
     scene.levels = {.count = 1, .base = 0, .endless = true};
     scene.lastDepth = 64;
-    for (std::size_t t = 0; t <= map.size(); ++t) cache.emplace_back(0.1f + unitFloat(hashBits(static_cast<std::uint32_t>(t))));
+    for (std::size_t t = 0; t <= map.size(); ++t)
+      cache.emplace_back(0.1f + unitFloat(hashBits(static_cast<std::uint32_t>(t))));
     const PageTexels& page = transport.texels[0];
     pixels.assign(static_cast<std::size_t>(page.width) * static_cast<std::size_t>(page.height), kNoTexel);
-    for (std::size_t t = 0; t < page.size(); ++t) pixels[pixelOf(page.coords[t].x, page.coords[t].y)] = static_cast<std::uint32_t>(t);
+    for (std::size_t t = 0; t < page.size(); ++t)
+      pixels[pixelOf(page.coords[t].x, page.coords[t].y)] = static_cast<std::uint32_t>(t);
   }
   std::size_t pixelOf(int x, int y) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(transport.texels[0].width) + static_cast<std::size_t>(x);
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(transport.texels[0].width) +
+           static_cast<std::size_t>(x);
   }
 
   GridScene grid;
@@ -196,7 +199,8 @@ void forEachNaiveRay(const Fixture& f, std::size_t texel, std::uint32_t samples,
     const Vec3 dir = point.frame.fromLocal(made.local);
     if (!(glm::dot(dir, point.geometricNormal) > 0)) continue;
     const Vec3& start = starts[s % kPoints];
-    made.ray.ray = {start.x, start.y, start.z, 0.0f, dir.x, dir.y, dir.z, 0.0f, std::numeric_limits<float>::infinity(), ~0u, 0, 0};
+    made.ray.ray = {start.x, start.y, start.z, 0.0f, dir.x, dir.y, dir.z, 0.0f, std::numeric_limits<float>::infinity(),
+                    ~0u,     0,       0};
     made.ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     made.ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     visit(made);
@@ -315,11 +319,15 @@ void gather(benchmark::State& state) {
   for (auto _ : state)
     for (const std::size_t first : firsts) {
       GatherWave wave(f.scene, 0, first, kLanes);
-      rays += static_cast<std::int64_t>(wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache, kOpen, {}).rays);
+      rays += static_cast<std::int64_t>(
+          wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache, kOpen, {}).rays);
     }
   state.SetItemsProcessed(rays);
 }
-BENCHMARK(gather)->ArgNames({"foliage", "rays"})->ArgsProduct({{Rooms, Foliage}, {16, 64, 256}})->Unit(benchmark::kMillisecond);
+BENCHMARK(gather)
+    ->ArgNames({"foliage", "rays"})
+    ->ArgsProduct({{Rooms, Foliage}, {16, 64, 256}})
+    ->Unit(benchmark::kMillisecond);
 
 void smoke(benchmark::State& state) { compare(state, Rooms, 16, modeOf(state.range(0)), 2, 1); }
 BENCHMARK(smoke)
