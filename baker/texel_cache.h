@@ -18,8 +18,8 @@ inline constexpr std::uint32_t kNoTexel = 0xffffffffu;
 /// Covered texels of all pages are numbered through: page by page, in the order of PageTexels.
 class TexelMap {
  public:
-  /// Keeps references to its arguments. Memory: half a byte per pixel of every page, 32 per triangle of a part that has
-  /// a lightmap.
+  /// Keeps references to its arguments. Memory: half a byte per pixel of every page (as if all were as wide as the
+  /// widest), 32 per triangle of a part that has a lightmap.
   TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<PageTexels>& texels);
 
   std::size_t size() const { return firstOfPage_.back(); }
@@ -108,8 +108,7 @@ class TexelMap {
   std::vector<PageMap> pages_;              // from 1 on
   std::uint32_t tilesAcross_ = 0;           // of all pages, so that lookups need not know which
   std::vector<Tile> tiles_;
-  // Of rays' first triangles, in lookups: and last one for rays that hit nothing.
-  std::vector<PartMap> lookedUp_;
+  std::vector<PartMap> lookedUp_;             // per part, for lookups; the last one is for rays that hit nothing
   std::vector<std::uint32_t> firstTriangle_;  // per part, shining ones too
   std::vector<Triangle> triangles_;
 };
