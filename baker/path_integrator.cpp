@@ -52,7 +52,7 @@ class WaveTracer {
   void launch(int lane, const Receiver& receiver, const Vec3& dirWorld, float pdf);
   void addLight(int lane, const Vec3& dirTangent, const Vec3& radianceOverPdf);
   void finishSample();
-  Vec3 rayStart(const SurfacePoint& point) const;
+  Receiver receiverAt(const SurfacePoint& point) const;
   /// Whether what shines by itself does not count for a ray.
   bool leavesOut(int depth) const { return depth == 0 && options_.indirectOnly; }
 
@@ -109,12 +109,26 @@ void WaveTracer::startTexels(std::uint32_t pageIndex, const PageTexels& page, st
   }
 }
 
-Vec3 WaveTracer::rayStart(const SurfacePoint& point) const {
+/// As WavePoints draws them.
+Receiver WaveTracer::receiverAt(const SurfacePoint& point) const {
   const Surface& surface = atlas_.surfaces[point.triangle.surface];
   const std::uint32_t* corner = surface.indices.data() + std::size_t{3} * point.triangle.triangle;
-  const std::array<Vec3, 3> corners = {surface.positions[corner[0]], surface.positions[corner[1]],
-                                       surface.positions[corner[2]]};
-  return offsetPoint(point.position, point.geometricNormal, corners, transport_.rays.translationOf(surface.instance));
+  std::array<Vec3, 3> corners, normals;
+  for (std::size_t i = 0; i < 3; ++i) {
+    corners[i] = surface.positions[corner[i]];
+    normals[i] = surface.normals[corner[i]];
+  }
+  const float translation = transport_.rays.translationOf(surface.instance);
+  Receiver receiver{point.position, point.geometricNormal, point.frame.n,
+                    offsetPoint(point.position, point.geometricNormal, corners, translation)};
+  const Vec3 e1 = corners[1] - corners[0], e2 = corners[2] - corners[0];
+  if (!isRounded(receiver.ng, e1, e2, normals)) return receiver;
+  const Vec3 lift =
+      liftToRound(point.position - corners[0], e1, e2, {point.barycentric.y, point.barycentric.z}, normals);
+  if (!(glm::dot(lift, receiver.ng) > offsetDistance(corners, translation))) return receiver;
+  receiver.rayStart += lift;
+  receiver.ng = receiver.ns;
+  return receiver;
 }
 
 void WaveTracer::startSample() {
@@ -129,7 +143,7 @@ void WaveTracer::startSample() {
     path = Path{};
     path.frame = point.frame;
     Receiver& receiver = lanes_.receivers[lane];
-    receiver = {point.position, point.geometricNormal, point.frame.n, rayStart(point)};
+    receiver = receiverAt(point);
     path.gatherTangent = sampleGatherHemisphere(direction[static_cast<int>(lane)]);
     path.gatherPdf = gatherHemispherePdf(path.gatherTangent.z);
     const Vec3 dirWorld = path.frame.fromLocal(path.gatherTangent);

@@ -132,6 +132,33 @@ inline Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const std::array<Vec3, 3>
          rayOffset(ng, (corners[0] - p) + (corners[1] - p) + (corners[2] - p), offsetDistance(corners, translation));
 }
 
+/// Whether unit normals at a triangle's corners describe a surface that is rounded outwards over it: they spread along
+/// its edges. Where they lean by more than 45 degrees (a box with smooth edges) they are a look and not a shape.
+inline bool isRounded(const Vec3& ng, const Vec3& e1, const Vec3& e2, const std::array<Vec3, 3>& normals) {
+  constexpr float kLeastCosine = 0.7f;
+  for (const Vec3& normal : normals)
+    if (!(glm::dot(ng, normal) > kLeastCosine)) return false;
+  const std::array<float, 3> spread = {glm::dot(normals[1] - normals[0], e1), glm::dot(normals[2] - normals[0], e2),
+                                       glm::dot(normals[2] - normals[1], e2 - e1)};
+  const float most = std::max({spread[0], spread[1], spread[2]});
+  const float least = std::min({spread[0], spread[1], spread[2]});
+  return most > 1e-4f * std::sqrt(std::max(glm::dot(e1, e1), glm::dot(e2, e2))) && least > -0.01f * most;
+}
+
+/// From a point of a rounded triangle out to the surface that its unit normals describe; zero where that bends inwards.
+/// Rays that start there do not meet the facets of the round thing itself, which would show as steps where its shade
+/// begins (Hanika 2021, "Hacking the Shadow Terminator"). The point lies at `fromFirst` = b.x e1 + b.y e2 from
+/// the first corner.
+inline Vec3 liftToRound(const Vec3& fromFirst, const Vec3& e1, const Vec3& e2, const Vec2& b,
+                        const std::array<Vec3, 3>& normals) {
+  const auto below = [](const Vec3& fromCorner, const Vec3& normal) {
+    const float depth = -glm::dot(fromCorner, normal);
+    return (depth > 0.0f ? depth : 0.0f) * normal;
+  };
+  return (1.0f - b.x - b.y) * below(fromFirst, normals[0]) + b.x * below(fromFirst - e1, normals[1]) +
+         b.y * below(fromFirst - e2, normals[2]);
+}
+
 class RayScene {
  public:
   /// Meshes that are placed once are flattened to world space, others become Embree instances. Keeps references to

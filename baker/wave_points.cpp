@@ -47,6 +47,7 @@ WavePoints::Source WavePoints::sourceOf(const RayScene& rays, const Surface& sur
   source.offsetMeters = offsetDistance(corners, rays.translationOf(surface.instance));
   source.flat = source.normals[0] == source.normals[1] && source.normals[0] == source.normals[2] &&
                 source.tangents[0] == source.tangents[1] && source.tangents[0] == source.tangents[2];
+  source.rounded = isRounded(source.ng, source.e1, source.e2, source.normals);
   if (source.flat) {
     const Vec3& normal = source.normals[0];
     const float length2 = glm::dot(normal, normal);
@@ -154,7 +155,8 @@ LUMEL_FOR_EACH_CPU void WavePoints::locateFrames(const Source& from, std::uint32
                                                  Drawn& drawn) {
   const std::array<Vec3, 3> normals = from.normals;
   const std::array<Vec4, 3> tangents = from.tangents;
-  const Vec3 ng = from.ng;
+  const Vec3 ng = from.ng, e1 = from.e1, e2 = from.e2;
+  const float distance = from.rounded ? from.offsetMeters : std::numeric_limits<float>::infinity();
   // A chart never mixes handedness, so neither does a triangle.
   const float hand = tangents[0].w < 0.0f ? -1.0f : 1.0f;
   constexpr float kMostFinite = std::numeric_limits<float>::max();
@@ -176,11 +178,14 @@ LUMEL_FOR_EACH_CPU void WavePoints::locateFrames(const Source& from, std::uint32
     const Vec3 t = pick(isFrame, side * unit, any.t);
     const float turn = pick(isFrame, hand, 1.0f);
     const Vec3 b = turn * glm::cross(n, t);
+    const Vec3 lift = liftToRound(w1 * e1 + w2 * e2, e1, e2, {w1, w2}, normals);
+    const bool lifted = glm::dot(lift, ng) > distance;
     for (int k = 0; k < 3; ++k) {
+      drawn.rayStart[k][i] += pick(here & lifted, lift[k], 0.0f);
       drawn.t[k][i] = pick(here, t[k], drawn.t[k][i]);
       drawn.b[k][i] = pick(here, b[k], drawn.b[k][i]);
       drawn.n[k][i] = pick(here, n[k], drawn.n[k][i]);
-      drawn.ng[k][i] = pick(here, ng[k], drawn.ng[k][i]);
+      drawn.ng[k][i] = pick(here, pick(lifted, n[k], ng[k]), drawn.ng[k][i]);
     }
   }
 }

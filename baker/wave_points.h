@@ -21,7 +21,7 @@ struct PointLanes {
   const Vec3Lanes& p;
   const Vec3Lanes& rayStart;
   const FrameLanes& frame;
-  const Vec3Lanes& ng;  // geometric normal
+  const Vec3Lanes& ng;  // geometric normal; that of the frame where rayStart is lifted (liftToRound)
 
   /// The same points as receivers of sampled light.
   ReceiverLanes receivers() const { return {active, p, ng, frame.n, rayStart}; }
@@ -66,6 +66,7 @@ class WavePoints {
     Vec3 ng{0, 0, 1};
     float offsetMeters = 0.0f;  // of ray starts
     bool flat = false;          // one frame throughout
+    bool rounded = false;       // isRounded
     Frame frame{};              // where flat
     std::array<Vec3, 3> normals{};
     std::array<Vec4, 3> tangents{};

@@ -290,6 +290,44 @@ TEST(DirectLight, SkyWithABrightSpotAgainstNumericIntegration) {
   }
 }
 
+// A pipe of 16 facets under the sun has the light of a round one: where its shade begins no facet is dark as a whole,
+// and none lies in the shadow of its neighbour.
+TEST(DirectLight, RoundThingsAreNotShadedByTheirFacets) {
+  constexpr int kFacets = 16, kTexels = 8;
+  TestScene test;
+  const auto normalAt = [](double turn) {
+    return Vec3d(std::cos(2 * kPiD * turn / kFacets), std::sin(2 * kPiD * turn / kFacets), 0);
+  };
+  // The first facet stands upright: half of it is in the light of the round pipe.
+  for (int k = 0; k < kFacets; ++k) {
+    const Vec3 from(normalAt(k - 0.5)), to(normalAt(k + 0.5));
+    test.addRectangle(from, to - from, {0, 0, 1}, {.texels = kTexels});
+    test.atlas.surfaces.back().normals = {from, to, to, from};
+    test.scene.meshes.back().primitives[0].normals = {from, to, to, from};
+  }
+  Light sun;
+  sun.type = LightType::Directional;
+  sun.direction = {0, -1, 0};
+  sun.intensity = static_cast<float>(kPiD);
+  test.scene.lights = {sun};
+  for (const Integrator integrator : {Integrator::Path, Integrator::Gather}) {
+    test.integrator = integrator;
+    const BakeResult result = test.bake({.samples = 256, .bounces = 0});
+    for (int k = 0; k < kFacets; ++k)
+      for (int x = 0; x < kTexels; ++x) {
+        double expected = 0;
+        for (int i = 0; i < 64; ++i) {
+          const double share = (x + (i + 0.5) / 64) / kTexels;
+          expected += std::max(0.0, glm::normalize(glm::mix(normalAt(k - 0.5), normalAt(k + 0.5), share)).y) / 64;
+        }
+        // At least 32 points of a texel, across which the light changes by at most 0.05.
+        EXPECT_NEAR(static_cast<double>(result.pages[static_cast<std::size_t>(k)].flat.rgb(x, kTexels / 2).x), expected,
+                    6e-3)
+            << "facet " << k << ", texel " << x;
+      }
+  }
+}
+
 TEST(DirectLight, NoLightsIsBlackAndCheap) {
   Ground ground;
   ground.test.addRoom({-5, -1, -5}, {5, 5, 5});
