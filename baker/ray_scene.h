@@ -133,9 +133,10 @@ inline Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const std::array<Vec3, 3>
 }
 
 /// Whether unit normals at a triangle's corners describe a surface that is rounded outwards over it: they spread along
-/// its edges. Where they lean by more than 45 degrees (a box with smooth edges) they are a look and not a shape.
+/// its edges. Where they lean by more than 15 degrees (a box with smooth edges, a basin with eight sides) they are a
+/// look and not a shape: rays that start so far out would miss what stands over the facets.
 inline bool isRounded(const Vec3& ng, const Vec3& e1, const Vec3& e2, const std::array<Vec3, 3>& normals) {
-  constexpr float kLeastCosine = 0.7f;
+  constexpr float kLeastCosine = 0.966f;
   for (const Vec3& normal : normals)
     if (!(glm::dot(ng, normal) > kLeastCosine)) return false;
   const std::array<float, 3> spread = {glm::dot(normals[1] - normals[0], e1), glm::dot(normals[2] - normals[0], e2),
