@@ -49,8 +49,8 @@ struct BakedPage {
   std::array<Image, 3> rnm;  // RGB
   Image flat;                // RGB: irradiance / pi
   // Channels of aux, in order: coverage (area share 0..1), validity (share of gather rays that met no back of a
-  // single-sided surface), stderr (standard error of the flat map's luminance), samples (those
-  // taken of this texel: fewer where it is inside of something).
+  // single-sided surface), stderr (standard error of the flat map's luminance), samples (those taken of this texel:
+  // fewer where its error has settled, or where it is inside of something).
   Image aux;
 };
 
