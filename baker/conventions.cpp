@@ -46,8 +46,8 @@ std::map<std::string, std::string> describeConventions(Projection projection) {
       {"order", "map i belongs to Bi; a frame of the other handedness swaps maps 1 and 2"},
       {"decode", nameOf(kBakeDecode)},
       {"decodeFormula",
-       "L = sum w_i map_i, w_i = saturate(N.B_i)^2 / sum_j saturate(N.B_j)^2; N = the normal map's 2 * texel - 1, green "
-       "up, else (0, 0, 1); colour = albedo * L + emission"},
+       "L = sum w_i map_i, w_i = saturate(N.B_i)^2 / sum_j saturate(N.B_j)^2; N = the normal map's 2 * texel - 1, "
+       "green up, else (0, 0, 1); colour = albedo * L + emission"},
       {"projection", nameOf(projection)},
       {"units", "irradiance / pi, linear Rec. 709; metres, candela, lux, nits; no 683 anywhere; not exposed"},
       {"frame", "t = TANGENT.xyz, n = NORMAL, b = TANGENT.w * cross(n, t) of scene.glb, orthonormalised"},

@@ -67,8 +67,8 @@ class DoublingError {
 
   std::vector<Run> runs_;
   std::vector<std::array<std::uint32_t, 9>> around_;
-  std::vector<float> squares_;  // of the last pass: d^2
-  std::vector<float> sums_;     // of d^2 over all passes, each scaled to the samples of the last
+  std::vector<float> squares_;              // of the last pass: d^2
+  std::vector<float> sums_;                 // of d^2 over all passes, each scaled to the samples of the last
   static constexpr float kLeftOut = -1.0f;  // both
   double credit_;
   double rate_ = 1.0;

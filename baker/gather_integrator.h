@@ -42,8 +42,8 @@ struct BakedTexel {
   std::array<Vec3, kProbeNormals> probes{};  // light on probeNormals(), where probed
 };
 
-/// Light of all texels, numbered through as in TexelMap: a vector for each map, so that each can be freed once its image
-/// is made.
+/// Light of all texels, numbered through as in TexelMap: a vector for each map, so that each can be freed once its
+/// image is made.
 struct TexelLight {
   std::vector<Vec3> flat;
   std::array<std::vector<Vec3>, 3> rnm;
@@ -152,8 +152,8 @@ class GatherIntegrator {
   std::vector<Wave> waves_;
   std::vector<LightSpread> spreads_;    // strategies and gather rays of every wave
   std::vector<std::size_t> firstWave_;  // per page
-  TexelLight sums_;  // over all samples so far
-  std::vector<Vec3> levelSums_;  // levels.count per texel, unless endless
+  TexelLight sums_;                     // over all samples so far
+  std::vector<Vec3> levelSums_;         // levels.count per texel, unless endless
   std::vector<Vec3> reflectance_;
   // Of the cache alone, with indirectOnly: light from light samples; sums of what the rays of all passes saw shine.
   std::vector<Vec3> direct_;

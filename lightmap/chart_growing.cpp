@@ -10,10 +10,10 @@
 namespace lumel {
 namespace {
 
-constexpr double kThinTexels = 0.5;       // creases of triangles thinner than this fade out: no texel could show them
-constexpr double kSmoothCrease = 0.25;    // weight of a crease that is shaded smooth
-constexpr double kMostCrease = 1.2;       // however small: a little over a right angle
-constexpr double kShapeWeight = 0.002;    // against ragged borders: only decides between merges that are flat alike
+constexpr double kThinTexels = 0.5;     // creases of triangles thinner than this fade out: no texel could show them
+constexpr double kSmoothCrease = 0.25;  // weight of a crease that is shaded smooth
+constexpr double kMostCrease = 1.2;     // however small: a little over a right angle
+constexpr double kShapeWeight = 0.002;  // against ragged borders: only decides between merges that are flat alike
 
 struct Region {
   NormalMoments normals;
@@ -41,7 +41,8 @@ double smallestEigenvalue(const std::array<double, 6>& m) {
   const double offDiagonal = m[3] * m[3] + m[4] * m[4] + m[5] * m[5];
   const double p = std::sqrt((a * a + b * b + c * c + 2 * offDiagonal) / 6);
   if (!(p > 1e-14)) return mean;
-  const double determinant = a * (b * c - m[5] * m[5]) - m[3] * (m[3] * c - m[5] * m[4]) + m[4] * (m[3] * m[5] - b * m[4]);
+  const double determinant =
+      a * (b * c - m[5] * m[5]) - m[3] * (m[3] * c - m[5] * m[4]) + m[4] * (m[3] * m[5] - b * m[4]);
   const double r = std::clamp(determinant / (2 * p * p * p), -1.0, 1.0);
   return mean + 2 * p * std::cos(std::acos(r) / 3 + 2 * std::numbers::pi / 3);
 }
@@ -49,7 +50,11 @@ double smallestEigenvalue(const std::array<double, 6>& m) {
 class Grower {
  public:
   Grower(const HalfEdgeMesh& mesh, const GrowOptions& options)
-      : mesh_(mesh), options_(options), points_(mesh.points.all()), place_(mesh.size(), kSingle), borders_(mesh.size(), 3 * mesh.size() / 2) {}
+      : mesh_(mesh),
+        options_(options),
+        points_(mesh.points.all()),
+        place_(mesh.size(), kSingle),
+        borders_(mesh.size(), 3 * mesh.size() / 2) {}
 
   MergeTree grow() {
     tree_.triangleCount = mesh_.size();
@@ -234,7 +239,8 @@ NormalMoments::NormalMoments(const Vec3d& areaNormal) : area(0.5 * glm::length(a
   moment = {n.x * sum.x, n.y * sum.y, n.z * sum.z, n.x * sum.y, n.x * sum.z, n.y * sum.z};
 }
 
-NormalMoments::NormalMoments(const NormalMoments& a, const NormalMoments& b) : area(a.area + b.area), sum(a.sum + b.sum) {
+NormalMoments::NormalMoments(const NormalMoments& a, const NormalMoments& b)
+    : area(a.area + b.area), sum(a.sum + b.sum) {
   for (std::size_t i = 0; i < 6; ++i) moment[i] = a.moment[i] + b.moment[i];
 }
 

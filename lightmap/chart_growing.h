@@ -12,9 +12,9 @@ namespace lumel {
 
 /// Sums over a region's triangles by which its bend is judged.
 struct NormalMoments {
-  double area = 0.0;                // texels
-  Vec3d sum{0.0};                   // of normals, weighted by area
-  std::array<double, 6> moment{};   // xx yy zz xy xz yz of normals, weighted by area
+  double area = 0.0;               // texels
+  Vec3d sum{0.0};                  // of normals, weighted by area
+  std::array<double, 6> moment{};  // xx yy zz xy xz yz of normals, weighted by area
 
   NormalMoments() = default;
   explicit NormalMoments(const Vec3d& areaNormal);  // of one triangle, twice its area long
@@ -25,9 +25,9 @@ struct NormalMoments {
 };
 
 struct GrowOptions {
-  double largestSide = 1000.0;     // texels: no region's bounding box is longer
+  double largestSide = 1000.0;    // texels: no region's bounding box is longer
   double maxConeVariance = 0.02;  // of the normals about the best cone; a spherical cap of 60 degrees has 0.021
-  double maxCreaseCosine = 0.5;    // regions that meet at a sharper angle (mean over their border) stay apart
+  double maxCreaseCosine = 0.5;   // regions that meet at a sharper angle (mean over their border) stay apart
 };
 
 /// A binary tree of merges over the mesh's triangles: nodes 0 .. n-1 are triangles, node n + i is merge i.

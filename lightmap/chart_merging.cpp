@@ -16,7 +16,7 @@
 namespace lumel {
 namespace {
 
-constexpr double kSmoothCrease = 0.25;  // weight of a crease that is shaded smooth
+constexpr double kSmoothCrease = 0.25;    // weight of a crease that is shaded smooth
 constexpr double kRescaledTexels = 16.0;  // charts of less area are scaled to it after parts of them were squeezed
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
@@ -37,10 +37,10 @@ struct Border {
 /// light had better share texels than be alone in a texel with a gutter around it.
 double creaseLimit(double area, double perimeter) {
   const double width = 2 * area / perimeter;
-  if (area < kTinyTexels || width < 0.75) return 1.2;   // just over a right angle
+  if (area < kTinyTexels || width < 0.75) return 1.2;  // just over a right angle
   if (width < 1.5) return 1.05;
   if (area < 16) return 0.75;  // 75 degrees
-  return 0.5;                                 // 60 degrees
+  return 0.5;                  // 60 degrees
 }
 
 enum class Phase {
@@ -52,8 +52,12 @@ enum class Phase {
 class PartMerger {
  public:
   PartMerger(const HalfEdgeMesh& mesh, std::vector<FlatChart*> charts, const std::vector<std::uint32_t>& localTriangle,
-              const std::vector<FrameBreak>& breaks, const MergeOptions& options)
-      : mesh_(mesh), options_(options), charts_(std::move(charts)), sheet_(mesh, charts_, localTriangle, breaks), borders_(charts_.size()) {}
+             const std::vector<FrameBreak>& breaks, const MergeOptions& options)
+      : mesh_(mesh),
+        options_(options),
+        charts_(std::move(charts)),
+        sheet_(mesh, charts_, localTriangle, breaks),
+        borders_(charts_.size()) {}
 
   std::vector<FlatChart> run() {
     makeBorders();
@@ -108,11 +112,13 @@ class PartMerger {
     Border& border = borders_[index];
     auto [into, from] = borders_.ends(index);
     const auto size = [this](std::uint32_t c) {
-      return phase_ == Phase::All ? static_cast<double>(sheet_.chart(c).triangles.size()) : sheet_.chart(c).normals.area;
+      return phase_ == Phase::All ? static_cast<double>(sheet_.chart(c).triangles.size())
+                                  : sheet_.chart(c).normals.area;
     };
     if (size(into) < size(from)) std::swap(into, from);
     std::vector<MeshEdge> shared;
-    for (const MeshEdge edge : border.edges) shared.push_back(sheet_.chartOf(edge.triangle) == into ? edge : sheet_.beyond(edge));
+    for (const MeshEdge edge : border.edges)
+      shared.push_back(sheet_.chartOf(edge.triangle) == into ? edge : sheet_.beyond(edge));
     // A long common border first; what meets by little of it only where no flattening of both does better.
     constexpr double kMuch = 0.25, kLittle = 0.12;  // of the border: half a pipe meets the other half along one of two
     if (moveTo(border, into, from, shared, kMuch) || flattenAsOne(border, into, from, shared) ||
@@ -127,7 +133,8 @@ class PartMerger {
   double frameGap() const { return phase_ == Phase::SmallTogether ? kSmallFrameGap : kFrameGap; }
 
   /// Joins the charts as they are, by a rigid motion that lets at least a share of the border meet.
-  bool moveTo(const Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared, double leastMatch) {
+  bool moveTo(const Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared,
+              double leastMatch) {
     const double smaller = std::min(sheet_.chart(into).normals.area, sheet_.chart(from).normals.area);
     for (const Fit& fit : sheet_.fits(shared, smallChartSlack(smaller))) {
       // What is too small for a chart of its own may hang on by any edge.
@@ -160,10 +167,10 @@ class PartMerger {
 
   /// Flattens both anew as one chart: for curved surfaces, whose borders do not meet rigidly.
   bool flattenAsOne(Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared) {
-    constexpr std::size_t kMostTriangles = 4000;   // keeps the number of flattenings times their cost near linear
-    constexpr double kMostConeVariance = 0.12;     // not worth the attempt
-    constexpr double kLeastBorder = 0.1;           // of the smaller one's perimeter: no chart with a narrow waist
-    constexpr double kGrowth = 1.3;                // since the last attempt
+    constexpr std::size_t kMostTriangles = 4000;  // keeps the number of flattenings times their cost near linear
+    constexpr double kMostConeVariance = 0.12;    // not worth the attempt
+    constexpr double kLeastBorder = 0.1;          // of the smaller one's perimeter: no chart with a narrow waist
+    constexpr double kGrowth = 1.3;               // since the last attempt
     const ChartSheet::Chart& a = sheet_.chart(into);
     const ChartSheet::Chart& b = sheet_.chart(from);
     if (a.triangles.size() + b.triangles.size() > kMostTriangles) return false;
@@ -187,7 +194,8 @@ class PartMerger {
     members_[from].clear();
     borders_.merge(from, into, [](std::uint32_t) {});
     // What was refused may fit the grown chart.
-    borders_.forEachOf(into, [this](std::uint32_t border) { queue_.push(border, [this](std::uint32_t b) { return cost(b); }); });
+    borders_.forEachOf(
+        into, [this](std::uint32_t border) { queue_.push(border, [this](std::uint32_t b) { return cost(b); }); });
   }
 
   std::vector<FlatChart> collect() {
@@ -217,13 +225,14 @@ class PartMerger {
   ChartSheet sheet_;
   BorderGraph<Border> borders_;
   Phase phase_ = Phase::All;
-  std::vector<std::vector<std::uint32_t>> members_;    // per chart: the charts that it is made of
+  std::vector<std::vector<std::uint32_t>> members_;  // per chart: the charts that it is made of
   BorderQueue queue_;
 };
 
 }  // namespace
 
-std::vector<FlatChart> mergeCharts(const HalfEdgeMesh& mesh, std::vector<FlatChart> charts, const MergeOptions& options) {
+std::vector<FlatChart> mergeCharts(const HalfEdgeMesh& mesh, std::vector<FlatChart> charts,
+                                   const MergeOptions& options) {
   std::vector<std::uint32_t> chartOf(mesh.size(), 0);
   for (std::uint32_t c = 0; c < charts.size(); ++c)
     for (const std::uint32_t t : charts[c].mesh.meshTriangles) chartOf[t] = c;

@@ -153,7 +153,8 @@ std::vector<Vec2d> convexHull(std::vector<Vec2d> points) {
   for (int side = 0; side < 2; ++side) {
     const std::size_t base = hull.size();
     for (const Vec2d p : points) {
-      while (hull.size() >= base + 2 && cross2(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0) hull.pop_back();
+      while (hull.size() >= base + 2 && cross2(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0)
+        hull.pop_back();
       hull.push_back(p);
     }
     hull.pop_back();

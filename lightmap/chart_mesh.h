@@ -22,7 +22,8 @@ struct ChartMesh {
 /// `triangles`: ascending, of `mesh`; connected over its neighbours.
 ChartMesh makeChartMesh(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> triangles);
 
-/// Sets `triangles` and `points` from `meshTriangles` and `neighbours`: corners that meet over a joined edge are one point.
+/// Sets `triangles` and `points` from `meshTriangles` and `neighbours`: corners that meet over a joined edge are one
+/// point.
 void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart);
 
 /// Breadth-first over joined edges from a triangle. A chart is connected: every triangle is reached.
@@ -65,9 +66,9 @@ SingularValues singularValues(const FlatTriangle& surface, const std::array<Vec2
 /// Sander, Snyder, Gortler and Hoppe 2001, "Texture Mapping Progressive Meshes": singular values of the map from the
 /// texture to the surface, with a chart scaled to its surface's area.
 struct Stretch {
-  double l2 = 0.0;         // root mean square over the surface; 1 is isometric
-  double badShare = 0.0;   // share of the surface where a singular value or its inverse exceeds the limit
-  std::size_t flipped = 0; // triangles turned over by more than a float UV could lose, or without area though not thin
+  double l2 = 0.0;          // root mean square over the surface; 1 is isometric
+  double badShare = 0.0;    // share of the surface where a singular value or its inverse exceeds the limit
+  std::size_t flipped = 0;  // triangles turned over by more than a float UV could lose, or without area though not thin
 };
 double surfaceArea(const ChartMesh& chart);
 Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, double limit);

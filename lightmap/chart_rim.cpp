@@ -43,7 +43,8 @@ bool ChartRim::mixesWith(const Edge& edge) const {
         for (const Point& point : cell->second) {
           const Vec2d gap = point.uv - uv;
           const Vec3d way = point.place - place;
-          if (glm::dot(gap, gap) < kNearTexels * kNearTexels && glm::dot(way, way) > kFarTexels * kFarTexels) return true;
+          if (glm::dot(gap, gap) < kNearTexels * kNearTexels && glm::dot(way, way) > kFarTexels * kFarTexels)
+            return true;
         }
       }
     return false;

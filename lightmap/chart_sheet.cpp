@@ -11,9 +11,9 @@ namespace lumel {
 namespace {
 
 constexpr double kOverlapTexels = 2e-3;
-constexpr double kMatchTexels = 0.25;    // how far welding may move a point
-constexpr double kMatchShare = 0.05;     // ... and of the edge's length
-constexpr std::size_t kSeeds = 4;                // edges that are tried as the one that matches
+constexpr double kMatchTexels = 0.25;  // how far welding may move a point
+constexpr double kMatchShare = 0.05;   // ... and of the edge's length
+constexpr std::size_t kSeeds = 4;      // edges that are tried as the one that matches
 
 std::uint64_t cellKey(std::int64_t x, std::int64_t y) {
   return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32) | static_cast<std::uint32_t>(y);
@@ -58,8 +58,8 @@ bool matches(const std::array<Vec2d, 4>& e, const Motion& motion, double slack) 
 
 }  // namespace
 
-ChartSheet::ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& charts, const std::vector<std::uint32_t>& localTriangle,
-                       const std::vector<FrameBreak>& breaks)
+ChartSheet::ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& charts,
+                       const std::vector<std::uint32_t>& localTriangle, const std::vector<FrameBreak>& breaks)
     : mesh_(mesh), localTriangle_(localTriangle) {
   std::size_t triangles = 0;
   for (const FlatChart* flat : charts) triangles += flat->mesh.triangles.size();
@@ -131,7 +131,8 @@ MeshEdge ChartSheet::beyond(MeshEdge edge) const {
   const auto other = static_cast<std::uint32_t>(mesh_.neighbours[edge.triangle][edge.k]);
   const std::uint32_t end = mesh_.triangles[edge.triangle][(edge.k + 1) % 3];
   for (std::uint32_t k = 0; k < 3; ++k)
-    if (mesh_.triangles[other][k] == end && mesh_.neighbours[other][k] == static_cast<std::int32_t>(edge.triangle)) return {other, k};
+    if (mesh_.triangles[other][k] == end && mesh_.neighbours[other][k] == static_cast<std::int32_t>(edge.triangle))
+      return {other, k};
   return {other, 0};
 }
 
@@ -204,7 +205,8 @@ std::vector<Fit> ChartSheet::fits(const std::vector<MeshEdge>& shared, double sl
     if (best.length > 0) found.push_back(std::move(best));
     if (complete) break;
   }
-  std::stable_sort(found.begin(), found.end(), [](const Fit& a, const Fit& b) { return a.length > b.length * (1 + 1e-9); });
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Fit& a, const Fit& b) { return a.length > b.length * (1 + 1e-9); });
   return found;
 }
 
@@ -212,8 +214,9 @@ std::vector<Fit> ChartSheet::hangings(const std::vector<MeshEdge>& shared, doubl
   std::vector<Fit> found;
   for (const MeshEdge edge : shared) {
     const MeshEdge from = beyond(edge);
-    const std::array<Vec2d, 4> ends = {uvs_[vertexAt(edge.triangle, edge.k)], uvs_[vertexAt(edge.triangle, (edge.k + 1) % 3)],
-                                       uvs_[vertexAt(from.triangle, (from.k + 1) % 3)], uvs_[vertexAt(from.triangle, from.k)]};
+    const std::array<Vec2d, 4> ends = {
+        uvs_[vertexAt(edge.triangle, edge.k)], uvs_[vertexAt(edge.triangle, (edge.k + 1) % 3)],
+        uvs_[vertexAt(from.triangle, (from.k + 1) % 3)], uvs_[vertexAt(from.triangle, from.k)]};
     Fit fit{procrustes({ends}), {edge}, glm::length(ends[1] - ends[0]), scale < 1};
     fit.motion.cosine *= scale;
     fit.motion.sine *= scale;
@@ -267,7 +270,8 @@ bool ChartSheet::liesOn(const Chart& target, std::uint32_t k, const std::array<V
   return hit;
 }
 
-bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit, double frameGap, const MergeOptions& options) const {
+bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit, double frameGap,
+                         const MergeOptions& options) const {
   const Chart& target = charts_[into];
   const Chart& moved = charts_[from];
   Welded welded{fit.motion, {}};
@@ -298,7 +302,8 @@ bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit,
     }
   }
   if (!packsWell(high - low, target.normals.area + moved.normals.area, options.largestSide)) return false;
-  return std::none_of(rim.begin(), rim.end(), [&target](const ChartRim::Edge& edge) { return target.rim.mixesWith(edge); });
+  return std::none_of(rim.begin(), rim.end(),
+                      [&target](const ChartRim::Edge& edge) { return target.rim.mixesWith(edge); });
 }
 
 /// To be called while the triangles of both charts still answer to their own.
@@ -306,7 +311,8 @@ void ChartSheet::joinBreaks(std::uint32_t into, std::uint32_t from) {
   std::vector<FrameBreak> kept;
   for (const std::uint32_t chart : {into, from})
     for (const FrameBreak& edge : charts_[chart].breaks) {
-      const std::uint32_t other = chartOf(edge.cornerA / 3) == chart ? chartOf(edge.cornerB / 3) : chartOf(edge.cornerA / 3);
+      const std::uint32_t other =
+          chartOf(edge.cornerA / 3) == chart ? chartOf(edge.cornerB / 3) : chartOf(edge.cornerA / 3);
       if (other != into && other != from) kept.push_back(edge);
     }
   charts_[into].breaks = std::move(kept);
@@ -321,8 +327,10 @@ void ChartSheet::join(std::uint32_t into, std::uint32_t from, const Fit& fit) {
     if (parent_[v] == v) uvs_[v] = fit.motion.apply(uvs_[v]);
   for (const MeshEdge edge : fit.matched) {
     const MeshEdge other = beyond(edge);
-    const std::array<std::uint32_t, 2> keep = {vertexAt(edge.triangle, edge.k), vertexAt(edge.triangle, (edge.k + 1) % 3)};
-    const std::array<std::uint32_t, 2> drop = {vertexAt(other.triangle, (other.k + 1) % 3), vertexAt(other.triangle, other.k)};
+    const std::array<std::uint32_t, 2> keep = {vertexAt(edge.triangle, edge.k),
+                                               vertexAt(edge.triangle, (edge.k + 1) % 3)};
+    const std::array<std::uint32_t, 2> drop = {vertexAt(other.triangle, (other.k + 1) % 3),
+                                               vertexAt(other.triangle, other.k)};
     for (std::size_t i = 0; i < 2; ++i)
       if (keep[i] != drop[i]) parent_[drop[i]] = keep[i];
     joined_[localTriangle_[edge.triangle]][edge.k] = true;
@@ -357,7 +365,8 @@ ChartMesh ChartSheet::together(std::uint32_t a, std::uint32_t b, const std::vect
   for (const std::uint32_t t : all) {
     std::array<std::int32_t, 3> neighbours = {-1, -1, -1};
     for (std::uint32_t k = 0; k < 3; ++k)
-      if (joined_[localTriangle_[t]][k]) neighbours[k] = static_cast<std::int32_t>(indexOf(static_cast<std::uint32_t>(mesh_.neighbours[t][k])));
+      if (joined_[localTriangle_[t]][k])
+        neighbours[k] = static_cast<std::int32_t>(indexOf(static_cast<std::uint32_t>(mesh_.neighbours[t][k])));
     mesh.neighbours.push_back(neighbours);
   }
   for (const MeshEdge edge : shared) {
@@ -371,7 +380,8 @@ ChartMesh ChartSheet::together(std::uint32_t a, std::uint32_t b, const std::vect
 
 bool ChartSheet::closesBreak(std::uint32_t a, std::uint32_t b, const FlatChart& flat, double frameGap) const {
   const std::vector<FrameBreak>& breaks = charts_[charts_[a].breaks.size() < charts_[b].breaks.size() ? a : b].breaks;
-  return std::any_of(breaks.begin(), breaks.end(), [&](const FrameBreak& edge) { return isClosed(flat, edge, frameGap); });
+  return std::any_of(breaks.begin(), breaks.end(),
+                     [&](const FrameBreak& edge) { return isClosed(flat, edge, frameGap); });
 }
 
 void ChartSheet::replace(std::uint32_t into, std::uint32_t from, const FlatChart& flat) {

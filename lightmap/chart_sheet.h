@@ -37,16 +37,16 @@ class ChartSheet {
     std::vector<std::uint32_t> triangles;  // of the mesh
     std::vector<std::uint32_t> vertices;   // of the sheet
     NormalMoments normals;
-    double perimeter = 0;                  // texels
+    double perimeter = 0;  // texels
     Vec2d low{0.0}, high{0.0};
-    std::vector<FrameBreak> breaks;        // of the mesh, with a side in this chart and the other in another
+    std::vector<FrameBreak> breaks;  // of the mesh, with a side in this chart and the other in another
     std::unordered_map<std::uint64_t, std::vector<MeshEdge>> border;  // by cell; looked up only
     ChartRim rim;
   };
 
   /// `breaks`: those of the mesh's whose both sides are in the sheet.
-  ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& charts, const std::vector<std::uint32_t>& localTriangle,
-             const std::vector<FrameBreak>& breaks);
+  ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& charts,
+             const std::vector<std::uint32_t>& localTriangle, const std::vector<FrameBreak>& breaks);
 
   const Chart& chart(std::uint32_t i) const { return charts_[i]; }
   std::uint32_t chartOf(std::uint32_t meshTriangle) const { return chartOf_[localTriangle_[meshTriangle]]; }
@@ -62,7 +62,8 @@ class ChartSheet {
 
   /// Whether `from`, moved and welded at the matched edges, keeps within the limits, lies on nothing of `into`, comes
   /// near to nothing of it that is far on the surface, and leaves `frameGap` texels at breaks of the material's frame.
-  bool mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit, double frameGap, const MergeOptions& options) const;
+  bool mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit, double frameGap,
+               const MergeOptions& options) const;
 
   void join(std::uint32_t into, std::uint32_t from, const Fit& fit);
 
@@ -102,10 +103,10 @@ class ChartSheet {
   const HalfEdgeMesh& mesh_;
   const std::vector<std::uint32_t>& localTriangle_;  // of the mesh's triangles: index within this sheet
   std::vector<Chart> charts_;
-  std::vector<std::uint32_t> chartOf_;                        // per local triangle
-  std::vector<std::array<std::uint32_t, 3>> cornerVertex_;    // per local triangle
-  std::vector<std::array<bool, 3>> joined_;                   // per local triangle and edge
-  mutable std::vector<std::uint32_t> parent_;                 // union-find over vertices
+  std::vector<std::uint32_t> chartOf_;                      // per local triangle
+  std::vector<std::array<std::uint32_t, 3>> cornerVertex_;  // per local triangle
+  std::vector<std::array<bool, 3>> joined_;                 // per local triangle and edge
+  mutable std::vector<std::uint32_t> parent_;               // union-find over vertices
   std::vector<Vec2d> uvs_;
   double cell_ = 1.0;
 };

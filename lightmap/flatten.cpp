@@ -9,11 +9,11 @@
 namespace lumel {
 namespace {
 
-constexpr double kFlatCosine = 0.9998;    // within 1.15 degrees of the plane: projection shortens by 0.02 %
-constexpr double kOverlapTexels = 2e-3;   // parts may lie on each other by less: far below a sample's distance
-constexpr double kMaxBadShare = 0.004;    // of a chart's surface, beyond the stretch limit
+constexpr double kFlatCosine = 0.9998;   // within 1.15 degrees of the plane: projection shortens by 0.02 %
+constexpr double kOverlapTexels = 2e-3;  // parts may lie on each other by less: far below a sample's distance
+constexpr double kMaxBadShare = 0.004;   // of a chart's surface, beyond the stretch limit
 constexpr double kMaxL2 = 1.03;
-constexpr double kSettledTexels = 0.01;   // root mean square: a relaxation that moves less has arrived
+constexpr double kSettledTexels = 0.01;  // root mean square: a relaxation that moves less has arrived
 constexpr double kSettledL2 = 1e-4;
 constexpr int kMaxIterations = 30;
 
@@ -122,7 +122,9 @@ std::vector<Vec2d> unroll(const ChartMesh& chart) {
 /// Local/global iterations: rotations per triangle, then one solve with a matrix that is factored once.
 class RigidRelaxation {
  public:
-  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), solver_(chart.points.all(), chart.triangles) { factorize(); }
+  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), solver_(chart.points.all(), chart.triangles) {
+    factorize();
+  }
 
   /// Iteratively reweighted towards a fourth power of the error: triangles beyond `limit` pull harder, so that the
   /// distortion spreads from where it is worst.
@@ -165,8 +167,8 @@ class RigidRelaxation {
     return s.small > 0 ? std::max(s.big, 1 / s.small) : 1e3;
   }
 
-  /// Of the angle opposite each edge (k, k + 1). Slivers, whose shape does not matter, are held less tightly than theirs
-  /// would have it, so that the matrix stays within what floating point can tell apart.
+  /// Of the angle opposite each edge (k, k + 1). Slivers, whose shape does not matter, are held less tightly than
+  /// theirs would have it, so that the matrix stays within what floating point can tell apart.
   std::array<double, 3> cotangents(std::size_t t, const FlatTriangle& flat) const {
     constexpr double kMost = 1e4;
     const std::array<Vec2d, 3> e = edges(flat);
@@ -228,9 +230,10 @@ bool isDevelopable(const ChartMesh& chart, std::span<const Vec2d> uvs, const Fla
 }
 
 /// A layout without flips that fails by little of its surface: evens the stretch out.
-bool spreadStretch(const ChartMesh& chart, RigidRelaxation& relaxation, std::vector<Vec2d>& uvs, const FlattenOptions& options) {
-  constexpr double kHopelessShare = 0.1;       // of the surface
-  constexpr std::size_t kMostTriangles = 8000; // each round is a factorization
+bool spreadStretch(const ChartMesh& chart, RigidRelaxation& relaxation, std::vector<Vec2d>& uvs,
+                   const FlattenOptions& options) {
+  constexpr double kHopelessShare = 0.1;        // of the surface
+  constexpr std::size_t kMostTriangles = 8000;  // each round is a factorization
   constexpr int kRounds = 8, kStepsPerRound = 4;
   if (chart.triangles.size() > kMostTriangles) return false;
   const Stretch before = measureStretch(chart, uvs, options.maxStretch);

@@ -20,7 +20,9 @@ bool findClosed(const FlatChart& chart, const FrameBreak& edge, double gap, Slit
   const std::int64_t b = find(chart.mesh, edge.cornerB / 3);
   if (a < 0 || b < 0 || a == b) return false;
   slit = {static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b)};
-  const auto uv = [&chart](std::uint32_t triangle, std::uint32_t k) { return chart.uvs[chart.mesh.triangles[triangle][k % 3]]; };
+  const auto uv = [&chart](std::uint32_t triangle, std::uint32_t k) {
+    return chart.uvs[chart.mesh.triangles[triangle][k % 3]];
+  };
   const Vec2d start = uv(slit.a, edge.cornerA % 3) - uv(slit.b, edge.cornerB % 3 + 1);
   const Vec2d end = uv(slit.a, edge.cornerA % 3 + 1) - uv(slit.b, edge.cornerB % 3);
   return glm::length(start) < gap && glm::length(end) < gap;

@@ -23,7 +23,7 @@ struct MeshTraits : OpenMesh::DefaultTraits {
 };
 using OpenMeshMesh = OpenMesh::TriMesh_ArrayKernelT<MeshTraits>;
 
-struct Side {  // of an edge: one triangle's half-edge
+struct Side {               // of an edge: one triangle's half-edge
   std::uint32_t low, high;  // welded points
   std::uint32_t corner;     // 3 * triangle + k: runs from corner k to k + 1
 };
@@ -123,7 +123,8 @@ class Builder {
     opposite_.assign(corners, -1);
     mesh_.hardEdges.assign(corners / 3, 0);
     for (std::size_t first = 0, last; first < sides.size(); first = last) {
-      for (last = first + 1; last < sides.size() && sides[last].low == sides[first].low && sides[last].high == sides[first].high;)
+      for (last = first + 1;
+           last < sides.size() && sides[last].low == sides[first].low && sides[last].high == sides[first].high;)
         ++last;
       const std::size_t count = last - first;
       if (count == 2 && pointAt(sides[first].corner) != pointAt(sides[first + 1].corner))
@@ -200,8 +201,8 @@ class Builder {
     readNeighbours(mesh, triangleOfFace, misfits);
   }
 
-  /// Triangles so that each one but the first of a sheet has a neighbour before it: OpenMesh links faces around a vertex
-  /// as they come, and cannot always join patches that began apart.
+  /// Triangles so that each one but the first of a sheet has a neighbour before it: OpenMesh links faces around a
+  /// vertex as they come, and cannot always join patches that began apart.
   std::vector<std::uint32_t> sheetOrder() const {
     std::vector<std::uint32_t> order;
     std::vector<bool> seen(opposite_.size() / 3, false);
@@ -230,18 +231,21 @@ class Builder {
     return true;
   }
 
-  void readNeighbours(const OpenMeshMesh& mesh, const std::vector<std::uint32_t>& triangleOfFace, const std::vector<std::uint32_t>& misfits) {
+  void readNeighbours(const OpenMeshMesh& mesh, const std::vector<std::uint32_t>& triangleOfFace,
+                      const std::vector<std::uint32_t>& misfits) {
     mesh_.neighbours.assign(mesh_.triangles.size(), {-1, -1, -1});
     for (std::uint32_t face = 0; face < triangleOfFace.size(); ++face) {
       const std::uint32_t t = triangleOfFace[face];
       for (std::uint32_t k = 0; k < 3; ++k) {
         const std::int32_t paired = opposite_[3 * t + k];
         if (paired < 0) continue;
-        const auto halfedge = mesh.find_halfedge(OpenMesh::VertexHandle(static_cast<int>(mesh_.triangles[t][k])),
-                                                 OpenMesh::VertexHandle(static_cast<int>(mesh_.triangles[t][(k + 1) % 3])));
+        const auto halfedge =
+            mesh.find_halfedge(OpenMesh::VertexHandle(static_cast<int>(mesh_.triangles[t][k])),
+                               OpenMesh::VertexHandle(static_cast<int>(mesh_.triangles[t][(k + 1) % 3])));
         const auto other = mesh.face_handle(mesh.opposite_halfedge_handle(halfedge));
         // Two fans may share both ends of an edge that is a break: only paired sides are neighbours.
-        if (other.is_valid() && triangleOfFace[static_cast<std::size_t>(other.idx())] == static_cast<std::uint32_t>(paired / 3))
+        if (other.is_valid() &&
+            triangleOfFace[static_cast<std::size_t>(other.idx())] == static_cast<std::uint32_t>(paired / 3))
           mesh_.neighbours[t][k] = paired / 3;
       }
     }
@@ -252,16 +256,17 @@ class Builder {
       for (std::uint32_t k = 0; k < 3; ++k)
         if (const std::int32_t paired = opposite_[3 * t + k]; paired >= 0) {
           mesh_.neighbours[t][k] = paired / 3;
-          mesh_.neighbours[static_cast<std::size_t>(paired / 3)][static_cast<std::size_t>(paired % 3)] = static_cast<std::int32_t>(t);
+          mesh_.neighbours[static_cast<std::size_t>(paired / 3)][static_cast<std::size_t>(paired % 3)] =
+              static_cast<std::int32_t>(t);
         }
   }
 
   TriangleSoup soup_;
   std::vector<std::uint32_t> welded_;
-  std::vector<Vec3> normals_;            // per kept triangle
-  std::vector<bool> shadedFromBehind_;   // per kept triangle: all its normals point away from its front
-  std::vector<std::int32_t> opposite_;   // per corner: the corner of the paired side, or -1
-  std::vector<std::uint32_t> fan_;       // per corner: union-find over corners joined around a point
+  std::vector<Vec3> normals_;           // per kept triangle
+  std::vector<bool> shadedFromBehind_;  // per kept triangle: all its normals point away from its front
+  std::vector<std::int32_t> opposite_;  // per corner: the corner of the paired side, or -1
+  std::vector<std::uint32_t> fan_;      // per corner: union-find over corners joined around a point
   HalfEdgeMesh mesh_;
 };
 

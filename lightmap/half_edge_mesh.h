@@ -42,12 +42,12 @@ struct FrameBreak {
 struct HalfEdgeMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;  // into `points`
   std::vector<std::array<std::int32_t, 3>> neighbours;  // triangle beyond edge (k, k + 1); -1 where none may be joined
-  std::vector<std::uint8_t> hardEdges;                  // bit k, edge (k, k + 1): the shading normals of its sides differ
+  std::vector<std::uint8_t> hardEdges;  // bit k, edge (k, k + 1): the shading normals of its sides differ
   TexelPoints points;
-  std::vector<std::uint32_t> leftOut;                   // triangles of the soup without area, ascending
+  std::vector<std::uint32_t> leftOut;  // triangles of the soup without area, ascending
   std::vector<FrameBreak> frameBreaks;
-  std::size_t nonManifoldEdges = 0;                     // more than two sides, or two of contrary winding
-  std::size_t selfMeetingTriangles = 0;                 // of sheets that meet themselves at both ends of an edge
+  std::size_t nonManifoldEdges = 0;      // more than two sides, or two of contrary winding
+  std::size_t selfMeetingTriangles = 0;  // of sheets that meet themselves at both ends of an edge
 
   std::size_t size() const { return triangles.size(); }
   bool isHard(std::size_t triangle, std::size_t k) const { return (hardEdges[triangle] >> k & 1) != 0; }

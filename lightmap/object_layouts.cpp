@@ -29,15 +29,17 @@ Shape shapeOf(const Instance& instance, double texelsPerMeter) {
   const Mat3d linear(Mat3(instance.worldFromObject));
   const Mat3d gram = glm::transpose(linear) * linear;
   const double trace = gram[0][0] + gram[1][1] + gram[2][2];
-  Shape shape{instance.mesh, glm::determinant(linear) < 0, {}, std::sqrt(trace / 3) * densityOf(instance, texelsPerMeter)};
+  Shape shape{
+      instance.mesh, glm::determinant(linear) < 0, {}, std::sqrt(trace / 3) * densityOf(instance, texelsPerMeter)};
   if (trace > 0)
-    shape.gram = {gram[0][0] / trace, gram[1][1] / trace, gram[2][2] / trace, gram[1][0] / trace, gram[2][0] / trace, gram[2][1] / trace};
+    shape.gram = {gram[0][0] / trace, gram[1][1] / trace, gram[2][2] / trace,
+                  gram[1][0] / trace, gram[2][0] / trace, gram[2][1] / trace};
   return shape;
 }
 
 bool sameShape(const Shape& a, const Shape& b) {
-  constexpr double kTolerance = 1e-4;   // stretch of 0.01 % between two instances: float transforms are not exact
-  constexpr double kScaleRange = 0.5;   // thresholds in texels still mean much the same
+  constexpr double kTolerance = 1e-4;  // stretch of 0.01 % between two instances: float transforms are not exact
+  constexpr double kScaleRange = 0.5;  // thresholds in texels still mean much the same
   if (a.mesh != b.mesh || a.mirrors != b.mirrors || !(b.scale >= kScaleRange * a.scale)) return false;
   for (std::size_t i = 0; i < 6; ++i)
     if (!(std::abs(a.gram[i] - b.gram[i]) <= kTolerance)) return false;
@@ -69,7 +71,8 @@ TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texel
     soup.frames.resize(positions.size(), Vec4(0.0f));
     if (hasMaterialFrame(primitive))  // as they will be baked: at right angles to the normal
       for (std::size_t i = 0; i < primitive.positions.size(); ++i)
-        soup.frames[base + i] = Vec4(frameFromTangent(primitive.normals[i], primitive.tangents[i]).t, primitive.tangents[i].w < 0 ? -1.0f : 1.0f);
+        soup.frames[base + i] = Vec4(frameFromTangent(primitive.normals[i], primitive.tangents[i]).t,
+                                     primitive.tangents[i].w < 0 ? -1.0f : 1.0f);
     source.add(static_cast<int>(p), primitive.triangleCount());
     for (std::uint32_t t = 0; t < primitive.triangleCount(); ++t)
       for (const std::uint32_t k : {0u, mirrors ? 2u : 1u, mirrors ? 1u : 2u})

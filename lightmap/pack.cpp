@@ -103,7 +103,8 @@ int AtlasPacker::keepPlaces(std::span<const PackShape> sources) {
   for (std::uint32_t i = 0; i < shapes_.size(); ++i) {
     if (!sources[i].keep || shapes_[i].texels.empty()) continue;
     const auto page = static_cast<std::size_t>(std::max(0, sources[i].keep->page));
-    if (page >= shapes_.size() || (options_.maxPages > 0 && page >= static_cast<std::size_t>(options_.maxPages))) continue;
+    if (page >= shapes_.size() || (options_.maxPages > 0 && page >= static_cast<std::size_t>(options_.maxPages)))
+      continue;
     if (page >= wanted.size()) wanted.resize(page + 1);
     wanted[page].push_back(i);
   }

@@ -24,8 +24,8 @@ struct KeptPlace {
 /// A flattened chart to place: its triangles in texels, in any position.
 struct PackShape {
   std::vector<std::array<Vec2, 3>> triangles;
-  std::uint32_t group = 0;  // charts of one group (object) are kept on one page where they fit
-  bool mayRotate = true;    // by quarter turns; false where the tangent convention forbids it
+  std::uint32_t group = 0;             // charts of one group (object) are kept on one page where they fit
+  bool mayRotate = true;               // by quarter turns; false where the tangent convention forbids it
   std::optional<KeptPlace> keep = {};  // stays there if it fits
 };
 
@@ -61,8 +61,8 @@ struct PackResult {
 
 /// Places every shape so that their conservatively rasterised texels stay `padding` apart. Deterministic.
 /// Shapes with a place to keep come first; one that does not fit there (off the page, off the blocks, too near to one
-/// before it) is placed like any other. The others go into the room between, on the pages that hold charts of their group
-/// before others, then on new pages. A last page with kept shapes is not packed anew: its sides are only cut.
+/// before it) is placed like any other. The others go into the room between, on the pages that hold charts of their
+/// group before others, then on new pages. A last page with kept shapes is not packed anew: its sides are only cut.
 /// Errors: Usage (a shape larger than a page), Interrupted.
 Expected<PackResult> packCharts(std::span<const PackShape> shapes, const PackOptions& options, Progress& progress);
 

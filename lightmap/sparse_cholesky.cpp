@@ -113,11 +113,13 @@ void SparseCholesky::analyse() {
 std::uint32_t SparseCholesky::localRow(const Front& front, std::uint32_t rank) const {
   if (rank < front.end) return rank - front.begin;
   const auto first = rows_.begin() + front.firstRow;
-  return front.end - front.begin + static_cast<std::uint32_t>(std::lower_bound(first, first + front.rows, rank) - first);
+  return front.end - front.begin +
+         static_cast<std::uint32_t>(std::lower_bound(first, first + front.rows, rank) - first);
 }
 
 /// The front's matrix before any of its points is gone.
-void SparseCholesky::assemble(std::uint32_t index, const Weights& weights, Workspace& work, std::vector<Update>& updates) const {
+void SparseCholesky::assemble(std::uint32_t index, const Weights& weights, Workspace& work,
+                              std::vector<Update>& updates) const {
   const Front& front = fronts_[index];
   const std::uint32_t pivots = front.end - front.begin;
   work.panel.setZero(pivots + front.rows, pivots);
@@ -155,7 +157,8 @@ void SparseCholesky::assemble(std::uint32_t index, const Weights& weights, Works
   }
 }
 
-bool SparseCholesky::eliminate(std::uint32_t index, const Weights& weights, Workspace& work, std::vector<Update>& updates) {
+bool SparseCholesky::eliminate(std::uint32_t index, const Weights& weights, Workspace& work,
+                               std::vector<Update>& updates) {
   const Front& front = fronts_[index];
   assemble(index, weights, work, updates);
   const Eigen::Index pivots = work.panel.cols();

@@ -32,13 +32,13 @@ class SparseCholesky {
   void solve(std::span<Vec2d> x) const;
 
  private:
-  struct Front {  // a node of the dissection: its points are eliminated at once
-    std::uint32_t begin = 0, end = 0;            // ranks of its points
-    std::int32_t left = -1, right = -1;          // fronts before it
-    std::uint32_t firstRow = 0, rows = 0;        // into rows_: ranks beyond `end` that it reaches, ascending
+  struct Front {                                     // a node of the dissection: its points are eliminated at once
+    std::uint32_t begin = 0, end = 0;                // ranks of its points
+    std::int32_t left = -1, right = -1;              // fronts before it
+    std::uint32_t firstRow = 0, rows = 0;            // into rows_: ranks beyond `end` that it reaches, ascending
     std::uint32_t firstTriangle = 0, triangles = 0;  // into order of triangles by their first point
-    std::uint32_t subtree = 1;                   // fronts below it and itself
-    std::size_t values = 0;                      // into values_: its columns, each from the diagonal down
+    std::uint32_t subtree = 1;                       // fronts below it and itself
+    std::size_t values = 0;                          // into values_: its columns, each from the diagonal down
   };
   struct Workspace;
   class Update;

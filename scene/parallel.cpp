@@ -22,8 +22,8 @@ extern "C" const char* __tsan_default_options() { return "ignore_noninstrumented
 namespace lumel {
 namespace {
 
-/// What the thread sanitizer has to be told, since TBB is not instrumented: a loop's bodies begin after its call and end
-/// before it returns, in no order among each other. Nothing in other builds.
+/// What the thread sanitizer has to be told, since TBB is not instrumented: a loop's bodies begin after its call and
+/// end before it returns, in no order among each other. Nothing in other builds.
 class LoopOrder {
  public:
 #ifdef LUMEL_THREAD_SANITIZER

@@ -38,7 +38,8 @@ AtlasFigures measureAtlas(const Atlas& atlas) {
   f.charts = atlas.charts.size();
   std::vector<double> surface(atlas.charts.size(), 0), texels(atlas.charts.size(), 0);
   std::vector<std::vector<std::uint8_t>> hits;
-  for (const Page& page : atlas.pages) hits.emplace_back(static_cast<std::size_t>(page.width * page.height * kPoints * kPoints), 0);
+  for (const Page& page : atlas.pages)
+    hits.emplace_back(static_cast<std::size_t>(page.width * page.height * kPoints * kPoints), 0);
   std::vector<std::pair<double, double>> stretch;  // value, area
   for (const Surface& s : atlas.surfaces) {
     const Page& page = atlas.pages[static_cast<std::size_t>(s.page)];
@@ -75,7 +76,8 @@ AtlasFigures measureAtlas(const Atlas& atlas) {
       for (Vec2d& q : uv) q *= kPoints;
       forEachCentre(uv, [&](int x, int y) {
         if (x < 0 || y < 0 || x >= page.width * kPoints || y >= page.height * kPoints) return;
-        std::uint8_t& hit = hits[static_cast<std::size_t>(s.page)][static_cast<std::size_t>(y * page.width * kPoints + x)];
+        std::uint8_t& hit =
+            hits[static_cast<std::size_t>(s.page)][static_cast<std::size_t>(y * page.width * kPoints + x)];
         f.coveredTexels += 1.0 / (kPoints * kPoints);
         if (hit) f.overlapTexels += 1.0 / (kPoints * kPoints);
         hit = 1;
@@ -148,15 +150,19 @@ Scene terrain(int cells, double side) {
   for (int y = 0; y <= cells; ++y)
     for (int x = 0; x <= cells; ++x) {
       const double u = side * x / cells, v = side * y / cells;
-      positions.push_back(Vec3(u, v, 3 * std::sin(0.11 * u) * std::cos(0.13 * v) + 0.8 * std::sin(0.43 * u + 1) * std::sin(0.37 * v)));
-      const double du = 0.33 * std::cos(0.11 * u) * std::cos(0.13 * v) + 0.344 * std::cos(0.43 * u + 1) * std::sin(0.37 * v);
-      const double dv = -0.39 * std::sin(0.11 * u) * std::sin(0.13 * v) + 0.296 * std::sin(0.43 * u + 1) * std::cos(0.37 * v);
+      positions.push_back(
+          Vec3(u, v, 3 * std::sin(0.11 * u) * std::cos(0.13 * v) + 0.8 * std::sin(0.43 * u + 1) * std::sin(0.37 * v)));
+      const double du =
+          0.33 * std::cos(0.11 * u) * std::cos(0.13 * v) + 0.344 * std::cos(0.43 * u + 1) * std::sin(0.37 * v);
+      const double dv =
+          -0.39 * std::sin(0.11 * u) * std::sin(0.13 * v) + 0.296 * std::sin(0.43 * u + 1) * std::cos(0.37 * v);
       normals.push_back(Vec3(glm::normalize(Vec3d(-du, -dv, 1))));
     }
   const auto at = [cells](int x, int y) { return static_cast<std::uint32_t>(y * (cells + 1) + x); };
   for (int y = 0; y < cells; ++y)
     for (int x = 0; x < cells; ++x)
-      for (const std::uint32_t i : {at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y), at(x + 1, y + 1), at(x, y + 1)}) indices.push_back(i);
+      for (const std::uint32_t i : {at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y), at(x + 1, y + 1), at(x, y + 1)})
+        indices.push_back(i);
   return sceneOf(std::move(positions), std::move(indices), std::move(normals));
 }
 

@@ -8,14 +8,14 @@ namespace lumel {
 struct AtlasFigures {
   std::size_t charts = 0;
   std::size_t triangles = 0;
-  std::size_t flipped = 0;       // turned over by more than a float UV's rounding
+  std::size_t flipped = 0;           // turned over by more than a float UV's rounding
   std::size_t mirroredTangents = 0;  // generated frames with w != +1
-  double overlapTexels = 0;      // covered twice, at 16 points per texel
+  double overlapTexels = 0;          // covered twice, at 16 points per texel
   double coveredTexels = 0;
   double minDensity = 0, maxDensity = 0;  // of charts, texels per metre
-  double worstStretch = 0;       // area-weighted 99th percentile of max(s, 1/s) over singular values s, at nominal density
-  double surface = 0;            // square metres
-  std::size_t outside = 0;       // vertices off the page
+  double worstStretch = 0;  // area-weighted 99th percentile of max(s, 1/s) over singular values s, at nominal density
+  double surface = 0;       // square metres
+  std::size_t outside = 0;  // vertices off the page
 };
 
 AtlasFigures measureAtlas(const Atlas& atlas);

@@ -19,7 +19,8 @@ HalfEdgeMesh meshOf(std::vector<Vec3> points, std::vector<std::array<std::uint32
     for (std::uint32_t u = 0; u < mesh.size(); ++u)
       for (std::size_t i = 0; i < 3; ++i)
         for (std::size_t j = 0; j < 3; ++j)
-          if (mesh.triangles[t][i] == mesh.triangles[u][(j + 1) % 3] && mesh.triangles[t][(i + 1) % 3] == mesh.triangles[u][j])
+          if (mesh.triangles[t][i] == mesh.triangles[u][(j + 1) % 3] &&
+              mesh.triangles[t][(i + 1) % 3] == mesh.triangles[u][j])
             mesh.neighbours[t][i] = static_cast<std::int32_t>(u);
   return mesh;
 }
@@ -39,11 +40,15 @@ struct TwoCharts {
   std::vector<MeshEdge> shared;  // from the big chart's side
 
   TwoCharts(HalfEdgeMesh whole, std::vector<std::uint32_t> bigTriangles, std::vector<std::uint32_t> smallTriangles)
-      : mesh(std::move(whole)), big(flatChart(mesh, bigTriangles)), small(flatChart(mesh, smallTriangles)), localTriangle(mesh.size()) {
+      : mesh(std::move(whole)),
+        big(flatChart(mesh, bigTriangles)),
+        small(flatChart(mesh, smallTriangles)),
+        localTriangle(mesh.size()) {
     std::iota(localTriangle.begin(), localTriangle.end(), 0u);
     for (const std::uint32_t t : bigTriangles)
       for (std::uint32_t k = 0; k < 3; ++k)
-        if (std::count(smallTriangles.begin(), smallTriangles.end(), static_cast<std::uint32_t>(mesh.neighbours[t][k])) > 0)
+        if (std::count(smallTriangles.begin(), smallTriangles.end(),
+                       static_cast<std::uint32_t>(mesh.neighbours[t][k])) > 0)
           shared.push_back({t, k});
   }
 
@@ -52,10 +57,20 @@ struct TwoCharts {
 
 TEST(ChartSheet, ASmallChartIsSqueezedIntoANotchThatItDoesNotFit) {
   // A slot of one texel's width in a block, and on its left side a triangle that is 1.9 texels high.
-  TwoCharts c(meshOf({{0, 0, 0}, {0, 4, 0}, {-4, 4, 0}, {-4, 0, 0}, {0, -4, 0}, {-4, -4, 0}, {0, 2, 1.9},
-                      {1, 0, 0}, {5, -4, 0}, {5, 4, 0}, {1, 4, 0}},
-                     {{0, 1, 2}, {0, 2, 3}, {0, 3, 5}, {0, 5, 4}, {0, 4, 7}, {7, 4, 8}, {7, 8, 9}, {7, 9, 10}, {1, 0, 6}}),
-              {0, 1, 2, 3, 4, 5, 6, 7}, {8});
+  TwoCharts c(
+      meshOf({{0, 0, 0},
+              {0, 4, 0},
+              {-4, 4, 0},
+              {-4, 0, 0},
+              {0, -4, 0},
+              {-4, -4, 0},
+              {0, 2, 1.9},
+              {1, 0, 0},
+              {5, -4, 0},
+              {5, 4, 0},
+              {1, 4, 0}},
+             {{0, 1, 2}, {0, 2, 3}, {0, 3, 5}, {0, 5, 4}, {0, 4, 7}, {7, 4, 8}, {7, 8, 9}, {7, 9, 10}, {1, 0, 6}}),
+      {0, 1, 2, 3, 4, 5, 6, 7}, {8});
   c.small.uvs = {{0, 4}, {0, 0}, {1.9, 2}};
   ASSERT_EQ(c.shared.size(), 1u);
   const ChartSheet sheet = c.sheet();
@@ -70,11 +85,19 @@ TEST(ChartSheet, ASmallChartIsSqueezedIntoANotchThatItDoesNotFit) {
 }
 
 TEST(ChartSheet, AStripThatWouldLieBesideAFarPartStaysApart) {
-  // A wall of 20 x 4 with a post at its end, and a strip that stands up on the post's side; laid flat it runs back along
-  // the wall, `gap` texels away.
+  // A wall of 20 x 4 with a post at its end, and a strip that stands up on the post's side; laid flat it runs back
+  // along the wall, `gap` texels away.
   for (const double gap : {0.5, 3.0}) {
-    TwoCharts c(meshOf({{0, 0, 0}, {20, 0, 0}, {20, 4, 0}, {0, 4, 0}, {24, 0, 0}, {24, 5 + gap, 0}, {20, 4 + gap, 0}, {20, 5 + gap, 0},
-                        {20, 4 + gap, 20}, {20, 5 + gap, 20}},
+    TwoCharts c(meshOf({{0, 0, 0},
+                        {20, 0, 0},
+                        {20, 4, 0},
+                        {0, 4, 0},
+                        {24, 0, 0},
+                        {24, 5 + gap, 0},
+                        {20, 4 + gap, 0},
+                        {20, 5 + gap, 0},
+                        {20, 4 + gap, 20},
+                        {20, 5 + gap, 20}},
                        {{0, 1, 2}, {0, 2, 3}, {1, 4, 2}, {4, 5, 2}, {2, 5, 6}, {6, 5, 7}, {6, 7, 9}, {6, 9, 8}}),
                 {0, 1, 2, 3, 4, 5}, {6, 7});
     for (std::size_t i = 0; i < c.small.uvs.size(); ++i) c.small.uvs[i].x = 20 - c.small.mesh.points[i].z;

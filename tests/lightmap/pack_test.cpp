@@ -292,7 +292,7 @@ TEST(PackKept, ANewGroupStaysTogetherOnANewPageWhereNoPageHasRoomForAllOfIt) {
 TEST(PackKept, PlacesThatCannotBeKeptAreGivenUp) {
   std::vector<PackShape> shapes(8, rectangle(10, 20));
   constexpr int kFar = 1 << 30;
-  const KeptPlace places[] = {{0, 0, 5, 5}, {0, 0, 14, 5}, {0, 0, -3, 5}, {0, 0, kFar, kFar},
+  const KeptPlace places[] = {{0, 0, 5, 5},  {0, 0, 14, 5},  {0, 0, -3, 5}, {0, 0, kFar, kFar},
                               {7, 0, 40, 5}, {-1, 0, 40, 5}, {0, 9, 40, 5}, {1, 1, 20, 30}};
   for (std::size_t i = 0; i < shapes.size(); ++i) shapes[i].keep = places[i];
   const PackResult result = pack(shapes, {.pageSize = 64, .padding = 2});

@@ -72,7 +72,8 @@ TEST(SparseCholesky, SolvesALaplacianUpToAShift) {
     }
     const Vec2d shift = solved[0] - expected[0];
     double worst = 0;
-    for (std::size_t i = 0; i < solved.size(); ++i) worst = std::max(worst, glm::length(solved[i] - shift - expected[i]));
+    for (std::size_t i = 0; i < solved.size(); ++i)
+      worst = std::max(worst, glm::length(solved[i] - shift - expected[i]));
     // Each round takes off what a factor of 16 bits can: two digits at the least.
     EXPECT_LT(worst, 1e-9) << cells;
   }
@@ -99,7 +100,9 @@ TEST(SparseCholesky, RefusesWhatDoesNotHangTogetherOrIsNotANumber) {
   EXPECT_FALSE(apart.factorize([](std::size_t) { return std::array<double, 3>{1, 1, 1}; }));
   const Laplacian laplacian(4);
   SparseCholesky solver(laplacian.points, laplacian.triangles);
-  EXPECT_FALSE(solver.factorize([](std::size_t) { return std::array<double, 3>{1, std::numeric_limits<double>::quiet_NaN(), 1}; }));
+  EXPECT_FALSE(solver.factorize([](std::size_t) {
+    return std::array<double, 3>{1, std::numeric_limits<double>::quiet_NaN(), 1};
+  }));
   EXPECT_TRUE(solver.factorize(Laplacian::weights));  // and can be used again
 }
 

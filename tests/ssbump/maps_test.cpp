@@ -20,9 +20,7 @@ namespace fs = std::filesystem;
 
 class Maps : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = scratch();
-  }
+  void SetUp() override { folder_ = scratch(); }
   fs::path path(const std::string& name) const { return folder_ / name; }
 
   /// A 16-bit height map, with alpha if asked: alpha = x * 257 / 65535 and so on, to be found again bit for bit.
