@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
 #include <cmath>
 
 #include "scene/parallel.h"
+#include "scene/stopwatch.h"
 
 namespace lumel {
 namespace {
@@ -166,9 +166,7 @@ Expected<void> GatherIntegrator::forEachWave(Progress& progress, Body body) {
 }
 
 Expected<void> GatherIntegrator::run(Progress& progress) {
-  using Clock = std::chrono::steady_clock;
-  const auto start = Clock::now();
-  const auto elapsed = [start] { return std::chrono::duration<double>(Clock::now() - start).count(); };
+  const Stopwatch sinceStart;
   const auto least = static_cast<std::uint32_t>(options_.samples);
   const std::uint32_t samples =
       options_.targetError > 0.0f ? std::max(least, static_cast<std::uint32_t>(options_.maxSamples)) : least;
@@ -180,12 +178,12 @@ Expected<void> GatherIntegrator::run(Progress& progress) {
   double secondsPerSample = 0.0;
   for (std::uint32_t first = 0; first < samples;) {
     const std::uint32_t end = std::min(samples, std::max(kFirstPass, 2 * first));
-    const double began = elapsed();
+    const double began = sinceStart.seconds();
     if (options_.timeBudgetSeconds > 0.0 && first > 0 &&
         began + secondsPerSample * (end - first) > options_.timeBudgetSeconds)
       break;
     if (auto done = pass(first, end, progress); !done) return done;
-    secondsPerSample = (elapsed() - began) / (end - first);
+    secondsPerSample = (sinceStart.seconds() - began) / (end - first);
     first = end;
     if (options_.targetError > 0.0f) {
       if (end >= std::max(kFirstJudged, least) && markDone() >= kTargetShare) break;
