@@ -12,12 +12,6 @@ namespace {
 
 float maxAbs(const Vec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
-/// Cofactor matrix: maps cross products of object-space edges to those of world-space edges.
-Mat3 cofactors(const Mat4& m) {
-  const Vec3 x(m[0]), y(m[1]), z(m[2]);
-  return {glm::cross(y, z), glm::cross(z, x), glm::cross(x, y)};
-}
-
 template <class T>
 T* embreeBuffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std::size_t count) {
   return static_cast<T*>(rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(T), count));
@@ -161,7 +155,7 @@ std::uint32_t RayScene::addParts(int instanceIndex) {
     part.instance = instanceIndex;
     part.worldFromObject = instance.worldFromObject;
     part.frontSign = glm::determinant(Mat3(instance.worldFromObject)) < 0 ? -1.0f : 1.0f;
-    part.worldFromNormal = cofactors(instance.worldFromObject) * part.frontSign;
+    part.worldFromNormal = cofactorMatrix(Mat3(instance.worldFromObject)) * part.frontSign;
     parts_.push_back(std::move(part));
   }
   return first;
