@@ -13,6 +13,7 @@
 #include <cstring>
 #include <fstream>
 #include <functional>
+#include <mutex>
 #include <system_error>
 
 #include "scene/check.h"
@@ -96,6 +97,15 @@ Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& nam
   return loaded;
 }
 
+/// OpenImageIO 2.4 names the countries of colour profiles from one table for all threads, which it fills without a lock
+/// while it opens a file. Pixels are decoded later, in parallel.
+std::unique_ptr<OIIO::ImageInput> openImage(const std::string& name, const OIIO::ImageSpec* config = nullptr,
+                                            OIIO::Filesystem::IOProxy* memory = nullptr) {
+  static std::mutex one;
+  const std::lock_guard lock(one);
+  return OIIO::ImageInput::open(name, config, memory);
+}
+
 /// An extension for encoded bytes, since OpenImageIO chooses the decoder of an image in memory by its name.
 std::string extensionFor(std::span<const std::uint8_t> encoded) {
   const std::string mimeType = imageMimeType(encoded);
@@ -110,7 +120,7 @@ std::string extensionFor(std::span<const std::uint8_t> encoded) {
 
 std::array<int, 2> imageSize(std::span<const std::uint8_t> encoded) {
   OIIO::Filesystem::IOMemReader memory(const_cast<std::uint8_t*>(encoded.data()), encoded.size());
-  const auto input = OIIO::ImageInput::open("memory." + extensionFor(encoded), nullptr, &memory);
+  const auto input = openImage("memory." + extensionFor(encoded), nullptr, &memory);
   if (!input) {
     OIIO::geterror();  // or it would be printed at exit
     return {0, 0};
@@ -145,7 +155,7 @@ Expected<LoadedImage> readImage(const std::filesystem::path& file, const Progres
   }
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
-  auto input = OIIO::ImageInput::open(name, &config);
+  auto input = openImage(name, &config);
   if (!input) return unreadable(name, OIIO::geterror());
   auto loaded = readOpened(*input, name, head, progress);
   if (loaded && !note.empty()) loaded->metadata["ImageDescription"] = note;
@@ -164,14 +174,14 @@ Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std
   const std::string extension = extensionFor(encoded);
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
-  auto input = OIIO::ImageInput::open("memory." + extension, &config, &memory);
+  auto input = openImage("memory." + extension, &config, &memory);
   if (input) return readOpened(*input, name, head);
   // Readers without memory support go through a temporary file.
   static std::atomic<int> counter{0};
   const auto file = std::filesystem::temp_directory_path() /
                     ("lumel-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + "." + extension);
   const std::string_view bytes(reinterpret_cast<const char*>(encoded.data()), encoded.size());
-  if (writeBytes({name, file}, bytes)) input = OIIO::ImageInput::open(file.string(), &config);
+  if (writeBytes({name, file}, bytes)) input = openImage(file.string(), &config);
   auto result = input ? readOpened(*input, name, head) : unreadable(name, OIIO::geterror());
   std::error_code ec;
   std::filesystem::remove(file, ec);
