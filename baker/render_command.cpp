@@ -11,6 +11,7 @@
 #include "baker/tone_map.h"
 #include "baker/version.h"
 #include "baker/viewpoint.h"
+#include "scene/file_access.h"
 #include "scene/file_set.h"
 #include "scene/image_io.h"
 #include "scene/parallel.h"
@@ -67,7 +68,7 @@ void declareOptions(OptionTable& options, RenderArguments& a) {
 }
 
 Expected<void> check(const RenderArguments& a) {
-  const std::string extension = a.output.extension().string();
+  const std::string extension = lowerCaseExtension(a.output);
   if (extension != ".png" && extension != ".exr")
     return usageError("--output: " + a.output.string() + ": pictures are .png or .exr");
   if (a.lookAt && !a.position) return usageError("--look-at needs --camera-position");
@@ -136,7 +137,7 @@ std::string describe(const Camera& camera) {
 Expected<void> writeStill(const RenderArguments& a, const Still& still, const std::string& camera, float exposure) {
   WriteImageOptions options;
   options.metadata = {{"lumel:version", kVersion}, {"lumel:camera", camera}};
-  if (a.output.extension() == ".exr") {
+  if (lowerCaseExtension(a.output) == ".exr") {
     options.metadata["lumel:units"] = "linear Rec. 709 radiance in nits, unexposed";
     return writeImage(a.output, still.radiance, options);
   }

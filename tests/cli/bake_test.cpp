@@ -184,8 +184,8 @@ TEST(Render, PixelIsAlbedoTimesLightmap) {
   EXPECT_NEAR(color.y, 0.25f, 0.005f);
   EXPECT_NEAR(color.z, 1.5f, 0.03f);
   // The PNG is exposed so that this is not black, and of the camera's aspect.
-  ASSERT_EQ(run({"render", dir / "out", "-o", dir / "still.png", "--width", "8"}).exitCode, 0);
-  const Image png = readPixels(dir / "still.png");
+  ASSERT_EQ(run({"render", dir / "out", "-o", dir / "still.PNG", "--width", "8"}).exitCode, 0);
+  const Image png = readPixels(dir / "still.PNG");
   EXPECT_EQ(png.height, 8);
   EXPECT_GT(png.rgb(4, 4).z, 0.3f);
 }
