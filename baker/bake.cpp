@@ -23,6 +23,9 @@ constexpr std::size_t kMostNotes = 10;
 /// Bounces of the path integrator where all that matter are asked for; Russian roulette ends paths well before.
 constexpr int kLongestPath = 64;
 
+/// Samples where nothing shines: only validity is left to find out.
+constexpr int kSamplesInTheDark = 8;
+
 /// Denormals are flushed while it lives: they are far below any light that a map can show and slow rays down.
 class FlushDenormals {
  public:
@@ -293,17 +296,22 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
 }  // namespace
 
 Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
-                          const BakeOptions& options, Progress& progress) {
+                          const BakeOptions& askedFor, Progress& progress) {
   const Stopwatch sinceStart;
   std::vector<std::string> notes;
-  const Materials materials(scene, options.bounces != 0, notes);
+  const Materials materials(scene, askedFor.bounces != 0, notes);
   auto rays = RayScene::build(scene, materials);
   if (!rays) return rays.error();
   const PunctualLights punctual(scene.lights);
   const EmissiveTriangles emissive(**rays, materials);
   const EnvironmentLight environment(scene.environment);
   const LightTransport transport{**rays, materials, punctual, emissive, environment};
-  const RnmKernels kernels(options.projection);
+  const RnmKernels kernels(askedFor.projection);
+  BakeOptions options = askedFor;
+  if (transport.dark()) {
+    options.samples = std::min(options.samples, kSamplesInTheDark);
+    options.targetError = 0.0f;
+  }
 
   BakeResult result;
   const auto waveStats = options.integrator == Integrator::Gather

@@ -303,6 +303,21 @@ TEST(Gather, ClosedRoomsStayBlack) {
   EXPECT_EQ(meanOf(test.bake({.samples = 64})), 0.0);
 }
 
+// Where nothing shines the rays have validity to find and nothing more.
+TEST(Gather, DarkScenesTakeFewSamples) {
+  for (const Integrator integrator : {Integrator::Gather, Integrator::Path}) {
+    TestScene test;
+    test.integrator = integrator;
+    const int page = test.addRectangle({-1, 0, 1}, {2, 0, 0}, {0, 0, -2});
+    test.addRectangle({-50, 0.5f, 50}, {100, 0, 0}, {0, 0, -100}, {.texels = 2});  // turns its back to it
+    const BakeResult result = test.bake({.samples = 4096, .targetError = 0.01f});
+    EXPECT_EQ(meanOf(result), 0.0);
+    const float* aux = result.pages[static_cast<std::size_t>(page)].aux.at(1, 1);
+    EXPECT_LT(aux[1], 0.3f);
+    EXPECT_EQ(aux[3], 8.0f);
+  }
+}
+
 TEST(Gather, AuxChannelsAndAnySampleCount) {
   TestScene test;
   test.integrator = Integrator::Gather;
