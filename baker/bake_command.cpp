@@ -206,8 +206,6 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   if (!scene) return scene.error();
   if (!context.quiet) printSettings(record.settings);
   if (!context.quiet) printWarnings(scene->report.warnings);
-  if (!context.quiet && !hasLight(*scene))
-    std::fputs("lumel: warning: the scene has no light and all will be black; give --sky-color or --sky\n", stderr);
   if (progress.cancelled()) return interrupted();
 
   clock.start("atlas");

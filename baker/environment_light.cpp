@@ -58,6 +58,14 @@ std::vector<CellWeights> weightsAlong(int pixels, std::size_t cells, Measure mea
   return all;
 }
 
+std::size_t rowsFor(const Image& image) {
+  return cellsFor(image.height, EnvironmentLight::kFewestColumns / 2, EnvironmentLight::kMostColumns / 2);
+}
+
+std::size_t columnsFor(const Image& image) {
+  return cellsFor(image.width, EnvironmentLight::kFewestColumns, EnvironmentLight::kMostColumns);
+}
+
 }  // namespace
 
 /// Cells that were chosen, and where in them.
@@ -68,6 +76,10 @@ struct EnvironmentLight::Places {
   alignas(64) float x[kLanes];
   alignas(64) float y[kLanes];
 };
+
+std::size_t EnvironmentLight::cellCount(const Image& image) {
+  return image.empty() ? 1 : rowsFor(image) * columnsFor(image);
+}
 
 EnvironmentLight::EnvironmentLight(const Environment& environment) {
   if (environment.isBlack()) return;
@@ -83,8 +95,8 @@ EnvironmentLight::EnvironmentLight(const Environment& environment) {
 /// Fills cells_ but for the densities. Returns their luminances.
 std::vector<float> EnvironmentLight::addCells(const Environment& environment) {
   const Image& image = environment.image;
-  const std::size_t rows = cellsFor(image.height, kFewestColumns / 2, kMostColumns / 2);
-  const std::size_t columns = cellsFor(image.width, kFewestColumns, kMostColumns);
+  const std::size_t rows = rowsFor(image);
+  const std::size_t columns = columnsFor(image);
   const double angle = static_cast<double>(environment.rotationDegrees) * (static_cast<double>(kPi) / 180.0);
   grid_ = {static_cast<int>(rows), static_cast<int>(columns), static_cast<float>(std::cos(angle)),
            static_cast<float>(std::sin(angle))};

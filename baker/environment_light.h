@@ -24,6 +24,9 @@ class EnvironmentLight {
   /// gathers from, and a black one costs nothing. Memory: 24 bytes per cell.
   explicit EnvironmentLight(const Environment& environment);
 
+  /// How many cells stand for an image; one for none.
+  static std::size_t cellCount(const Image& image);
+
   /// Whether rays that leave the scene bring anything back.
   bool shines() const { return !cells_.empty(); }
   /// Whether sampleSun() and sampleSky() are of use.

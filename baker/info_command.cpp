@@ -6,6 +6,7 @@
 #include "baker/baked_scene.h"
 #include "baker/command.h"
 #include "baker/image_figures.h"
+#include "baker/scene_arguments.h"
 #include "baker/scene_figures.h"
 #include "baker/scene_lint.h"
 #include "scene/image_io.h"
@@ -17,13 +18,11 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-struct InfoArguments {
-  fs::path file;
+struct InfoArguments : SceneArguments {  // `scene`: a scene, an image or a bake
   bool json = false;
   EstimateOptions estimate;
   bool lint = false;
   SceneLintOptions lintOptions;
-  bool allowOutsidePaths = false;
 };
 
 bool isScalar(const Json& value) { return !value.is_object() && !value.is_array(); }
@@ -97,11 +96,11 @@ Expected<Json> describeBakeFolder(const fs::path& dir) {
 
 Expected<Json> describe(const InfoArguments& a) {
   std::error_code ec;
-  if (fs::is_directory(a.file, ec)) return describeBakeFolder(a.file);
-  if (!isSceneFile(a.file)) return describeImage(a.file);
-  const auto scene = loadScene(a.file, {.allowOutsidePaths = a.allowOutsidePaths});
+  if (fs::is_directory(a.scene, ec)) return describeBakeFolder(a.scene);
+  if (!isSceneFile(a.scene)) return describeImage(a.scene);
+  const auto scene = loadSceneUnderSky(a);
   if (!scene) return scene.error();
-  Json out = {{"kind", "scene"}, {"file", a.file.string()}};
+  Json out = {{"kind", "scene"}, {"file", a.scene.string()}};
   if (a.lint || !a.lintOptions.pictures.empty()) {
     SceneLintOptions options = a.lintOptions;
     options.atlas.texelsPerMeter = a.estimate.texelsPerMeter;
@@ -127,13 +126,13 @@ Command infoCommand() {
   command.examples =
       "Examples:\n"
       "  lumel info level.gltf --texels-per-meter 16\n"
-      "      meshes, materials, lights, warnings, and how many texels such a bake would have\n"
+      "      meshes, materials, lights, warnings, and how many texels and how much memory such a bake would take\n"
       "  lumel info level.gltf --lint --charts out/charts\n"
       "      what is wrong or wasteful in the lightmap UVs, and pictures of them\n"
       "  lumel info out/level\n"
       "      settings, conventions, pages and figures of a bake\n"
       "  lumel info out/level/lightmap-0-flat.exr --json";
-  command.options.positionalPath("file", a.file, "Scene (.gltf, .glb, .obj), folder of a bake, or image").placeholder =
+  command.options.positionalPath("file", a.scene, "Scene (.gltf, .glb, .obj), folder of a bake, or image").placeholder =
       "FILE|DIR";
   command.options.flag("json", a.json, "Print JSON");
   command.options.group("Scene");
@@ -147,8 +146,10 @@ Command infoCommand() {
   command.options.integer("padding", a.lintOptions.atlas.padding, {0, 64}, "Texels between charts");
   command.options.path("charts", a.lintOptions.pictures, "Write a picture of each page's charts (PNG) to this folder")
       .placeholder = "DIR";
-  command.options.flag("allow-outside-paths", a.allowOutsidePaths, "Let the scene name files outside its own folder");
+  declareSky(command.options, a);
+  declareOutsidePaths(command.options, a);
   command.run = [arguments](CommandContext& context) -> Expected<void> {
+    if (auto checked = checkSky(*arguments); !checked) return checked;
     const auto json = describe(*arguments);
     if (!json) return json.error();
     if (arguments->json)

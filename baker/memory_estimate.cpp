@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "baker/environment_light.h"
 #include "scene/image_io.h"
 
 namespace lumel {
@@ -27,6 +28,8 @@ constexpr double kChartsPerTriangle = 195.0;
 constexpr double kSamplingPerTriangle = 200.0;
 constexpr double kFinishingPerTriangle = 150.0;
 constexpr double kPerDecodedTexel = 4.0;
+constexpr double kPerSkyPixel = 12.0;
+constexpr double kPerSkyCell = 24.0;
 
 }  // namespace
 
@@ -46,17 +49,23 @@ BakeSize sceneSize(const Scene& scene) {
     const auto [width, height] = imageSize(scene.images[static_cast<std::size_t>(i)].encoded);
     size.decodedTexels += static_cast<double>(width) * height;
   }
+  if (!scene.environment.isBlack()) {
+    const Image& sky = scene.environment.image;
+    size.skyPixels = static_cast<double>(sky.width) * sky.height;
+    size.skyCells = static_cast<double>(EnvironmentLight::cellCount(sky));
+  }
   return size;
 }
 
 double bakeMemory(const BakeSize& size) {
   const double charts = kChartsPerTriangle * size.triangles;
   const double sampling = kSamplingPerTriangle * size.triangles + kPerDecodedTexel * size.decodedTexels +
-                          kSamplingPerCovered * size.coveredTexels + kSamplingPerPageTexel * size.pageTexels;
+                          kSamplingPerCovered * size.coveredTexels + kSamplingPerPageTexel * size.pageTexels +
+                          kPerSkyCell * size.skyCells;
   // scene.glb holds the encoded images once more, while it is written.
   const double finishing = size.encodedBytes + kFinishingPerTriangle * size.triangles +
                            kFinishingPerCovered * size.coveredTexels + kFinishingPerPageTexel * size.pageTexels;
-  return kBase + size.encodedBytes + std::max({charts, sampling, finishing});
+  return kBase + size.encodedBytes + kPerSkyPixel * size.skyPixels + std::max({charts, sampling, finishing});
 }
 
 }  // namespace lumel

@@ -12,9 +12,11 @@ struct BakeSize {
   double triangles = 0.0;      // of all instances
   double encodedBytes = 0.0;   // of images, as they are in their files
   double decodedTexels = 0.0;  // of images that shade or emit
+  double skyPixels = 0.0;      // of the sky image
+  double skyCells = 0.0;       // of EnvironmentLight
 };
 
-/// Triangles and images of a scene; texels are left at 0.
+/// Triangles, images and sky of a scene; texels are left at 0.
 BakeSize sceneSize(const Scene& scene);
 
 /// Peak resident memory of `lumel bake` in bytes, the program and its libraries included. README has the model and how

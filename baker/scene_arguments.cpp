@@ -32,7 +32,7 @@ void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas) {
                   "Let no block of so many texels hold two charts, 4 for block compression; 0: off");
 }
 
-void declareSkyAndSides(OptionTable& options, SceneArguments& a) {
+void declareSky(OptionTable& options, SceneArguments& a) {
   options.color("sky-color", a.skyColor, {0.0f}, "Radiance of an even sky in nits, red green blue [none]");
   options.path("sky", a.sky, "Sky image: equirectangular .hdr or .exr [none]");
   options
@@ -40,6 +40,10 @@ void declareSkyAndSides(OptionTable& options, SceneArguments& a) {
               "Degrees by which the sky image is turned, counter-clockwise from above")
       .placeholder = "DEGREES";
   options.number("sky-strength", a.skyStrength, {0.0f}, "Factor on the sky image or colour");
+}
+
+void declareSkyAndSides(OptionTable& options, SceneArguments& a) {
+  declareSky(options, a);
   options.choice("double-sided", a.doubleSided, {"lit", "wound"},
                  "Side of double-sided surfaces that gets the lightmap: their front as it is wound, but the back where "
                  "only that is lit (lit); always their front (wound)");
@@ -57,7 +61,7 @@ Expected<void> checkAtlas(const AtlasOptions& atlas) {
   return {};
 }
 
-Expected<Scene> loadLitScene(const SceneArguments& a, const Progress& progress) {
+Expected<Scene> loadSceneUnderSky(const SceneArguments& a) {
   auto scene = loadScene(a.scene, {.allowOutsidePaths = a.allowOutsidePaths});
   if (!scene) return scene;
   if (!a.sky.empty()) {
@@ -69,6 +73,15 @@ Expected<Scene> loadLitScene(const SceneArguments& a, const Progress& progress) 
   }
   scene->environment.rotationDegrees = a.skyRotation;
   scene->environment.strength = a.skyStrength;
+  if (!hasLight(*scene))
+    scene->report.warnings.insert(scene->report.warnings.begin(),
+                                  "the scene has no light and all will be black; give --sky-color or --sky");
+  return scene;
+}
+
+Expected<Scene> loadLitScene(const SceneArguments& a, const Progress& progress) {
+  auto scene = loadSceneUnderSky(a);
+  if (!scene) return scene;
   if (a.doubleSided == DoubleSided::Wound || !hasLight(*scene)) return scene;
   const auto turned = turnToLight(*scene, progress);
   if (!turned) return turned.error();

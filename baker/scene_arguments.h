@@ -32,11 +32,15 @@ struct SceneArguments {
 void declareScene(OptionTable& options, SceneArguments& a);
 void declareOutsidePaths(OptionTable& options, SceneArguments& a);
 void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas);
+void declareSky(OptionTable& options, SceneArguments& a);
 void declareSkyAndSides(OptionTable& options, SceneArguments& a);
 
 /// What the options cannot check one by one. Errors: Usage.
 Expected<void> checkSky(const SceneArguments& a);
 Expected<void> checkAtlas(const AtlasOptions& atlas);
+
+/// The scene with its sky; without any light a warning in its report says so. Errors: Input.
+Expected<Scene> loadSceneUnderSky(const SceneArguments& a);
 
 /// The scene with its sky, double-sided surfaces turned as asked for. Errors: Input, and those of turnToLight.
 Expected<Scene> loadLitScene(const SceneArguments& a, const Progress& progress);

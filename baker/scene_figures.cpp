@@ -65,6 +65,17 @@ Json describeLights(const Scene& scene) {
   return list;
 }
 
+Json describeSky(const Environment& sky) {
+  Json json = {{"strength", sky.strength}};
+  if (sky.image.empty()) {
+    json["color"] = toJson(sky.color);
+  } else {
+    json["pixels"] = {sky.image.width, sky.image.height};
+    json["rotationDegrees"] = sky.rotationDegrees;
+  }
+  return json;
+}
+
 Json countUvSets(const Scene& scene) {
   std::vector<std::size_t> counts;
   std::size_t primitives = 0;
@@ -137,6 +148,7 @@ Json describeScene(const Scene& scene, const EstimateOptions& options) {
   json["materials"] = describeMaterials(scene);
   json["images"] = std::move(images);
   json["lights"] = describeLights(scene);
+  if (!scene.environment.isBlack()) json["sky"] = describeSky(scene.environment);
   json["cameras"] = std::move(cameras);
   json["estimate"] = estimate(totals, sceneSize(scene), options);
   json["warnings"] = scene.report.warnings;

@@ -12,8 +12,8 @@ struct EstimateOptions {
   int pageSize = 1024;
 };
 
-/// Counts, bounds, lists of materials, images, lights and cameras, the loader's warnings, and an estimate of texels,
-/// pages, memory and disk space.
+/// Counts, bounds, lists of materials, images, lights and cameras, the sky, the loader's warnings, and an estimate of
+/// texels, pages, memory and disk space.
 nlohmann::ordered_json describeScene(const Scene& scene, const EstimateOptions& options);
 
 }  // namespace lumel

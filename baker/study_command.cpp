@@ -56,8 +56,8 @@ Expected<void> runStudy(const StudyArguments& a, CommandContext& context) {
   const ThreadLimit limit(a.threads);
   const auto scene = loadLitScene(a, context.progress);
   if (!scene) return scene.error();
-  if (!context.quiet) printWarnings(scene->report.warnings);
   if (!hasLight(*scene)) return inputError(a.scene.string() + ": nothing in it shines; give --sky-color or --sky");
+  if (!context.quiet) printWarnings(scene->report.warnings);
   if (!context.quiet) std::fprintf(stderr, "study of %s: a reference, then the candidates\n", a.scene.c_str());
   StudyOptions options = a.study;
   options.timeBudgetSeconds = static_cast<double>(a.timeBudget);

@@ -1,6 +1,7 @@
 // What a user meets who makes a mistake: an exit code for scripts and one line that says what, where and what to do.
 #include <gtest/gtest.h>
 
+#include "scene/image_io.h"
 #include "tests/cli/harness.h"
 
 namespace lumel::cli {
@@ -214,6 +215,16 @@ TEST(Info, DescribesScenesImagesAndBakes) {
   EXPECT_EQ(json["triangles"], 2);
   EXPECT_EQ(json["materials"].size(), 1u);
   EXPECT_EQ(json["estimate"]["texels"], 400);  // 2 m x 2 m
+  // Under a sky image a bake takes what EnvironmentLight does: 12 bytes a pixel, 24 for each of 512 x 256 cells.
+  ASSERT_TRUE(writeImage(dir / "sky.exr", Image(64, 32, 3, 1.0f)));
+  const auto lit = nlohmann::json::parse(run({"info", scene, "--json", "--sky", dir / "sky.exr"}).out, nullptr, false);
+  const auto dark = nlohmann::json::parse(run({"info", scene, "--json"}).out, nullptr, false);
+  EXPECT_EQ(lit["sky"]["pixels"], nlohmann::json({64, 32}));
+  EXPECT_NEAR(lit["estimate"]["bakeMemoryBytes"].get<double>() - dark["estimate"]["bakeMemoryBytes"].get<double>(),
+              12 * 64 * 32 + 24 * 512 * 256, 2);
+  // Without it a warning says that nothing shines.
+  EXPECT_EQ(json["warnings"].size(), 1u);
+  EXPECT_EQ(lit["warnings"].size(), 0u);
   // What cannot be seen gets no lightmap.
   nlohmann::json glass = gltfOf({floorQuad()});
   glass["materials"][0]["alphaMode"] = "BLEND";
