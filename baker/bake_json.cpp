@@ -152,6 +152,12 @@ const std::vector<std::string>& chartColumns() {
   return columns;
 }
 
+const Json& chartColumn(const Json& row, std::string_view name) {
+  std::size_t i = 0;
+  while (chartColumns()[i] != name) ++i;
+  return row[i];
+}
+
 std::string describeBake(const Scene& scene, const AtlasResult& atlas, const BakeResult& result,
                          const BakeRecord& record) {
   std::vector<std::string> warnings = scene.report.warnings;

@@ -2,10 +2,12 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <iterator>
 #include <memory>
 #include <ostream>
 
 #include "baker/bake_files.h"
+#include "baker/bake_json.h"
 #include "baker/baked_scene.h"
 #include "baker/command.h"
 #include "baker/image_figures.h"
@@ -132,6 +134,43 @@ Expected<void> diffImages(const DiffArguments& a, CommandContext& context) {
   return report(a, context, {std::move(*pair)});
 }
 
+/// What tells a chart and its place from others, for all charts of a bake, sorted: the key of a generated one, the
+/// object and number of triangles of one that came with the scene.
+std::vector<std::string> placesOf(const Json& bake) {
+  std::vector<std::string> places;
+  const auto charts = bake.find("charts");
+  if (charts == bake.end() || !charts->is_object() || !charts->contains("rows")) return places;
+  for (const Json& row : charts->at("rows")) {
+    if (!row.is_array() || row.size() != chartColumns().size()) continue;
+    const auto of = [&row](const char* name) -> const Json& { return chartColumn(row, name); };
+    const Json place = of("key").is_null() ? Json::array({of("page"), of("instance"), of("primitive"), of("triangles")})
+                                           : Json::array({of("page"), of("key"), of("quarterTurns"), of("x"), of("y")});
+    places.push_back(place.dump());
+  }
+  std::sort(places.begin(), places.end());
+  return places;
+}
+
+/// Texels of two bakes stand for the same surfaces where their charts lie in the same places. Errors: Input, where none
+/// does.
+Expected<void> checkCharts(const DiffArguments& a, const Json& first, const Json& second, bool quiet) {
+  const std::vector<std::string> placesA = placesOf(first), placesB = placesOf(second);
+  std::vector<std::string> both;
+  std::set_intersection(placesA.begin(), placesA.end(), placesB.begin(), placesB.end(), std::back_inserter(both));
+  const std::size_t most = std::max(placesA.size(), placesB.size());
+  if (both.size() == most) return {};
+  if (both.empty())
+    return inputError(a.a.string() + " and " + a.b.string() +
+                      " have no chart in the same place: their texels stand for different surfaces and cannot be "
+                      "compared; bake one with --layout-from the other");
+  if (!quiet)
+    std::fprintf(stderr,
+                 "lumel: warning: only %zu of %zu charts lie in the same place in both: the rest of the figures and "
+                 "heat maps compares different surfaces\n",
+                 both.size(), most);
+  return {};
+}
+
 Expected<void> diffBakes(const DiffArguments& a, CommandContext& context) {
   const auto first = readBakeJson(a.a);
   if (!first) return first.error();
@@ -141,6 +180,7 @@ Expected<void> diffBakes(const DiffArguments& a, CommandContext& context) {
   if (second->value("pages", Json::array()).size() != pages)
     return inputError(a.a.string() + " has " + std::to_string(pages) + " pages, " + a.b.string() + " has " +
                       std::to_string(second->value("pages", Json::array()).size()) + "; they are different atlases");
+  if (auto comparable = checkCharts(a, *first, *second, context.quiet); !comparable) return comparable;
   std::vector<Pair> pairs;
   for (std::size_t page = 0; page < pages; ++page) {
     const auto maskA = readMask(a.a / pageFileName(page, "aux"));
@@ -190,7 +230,8 @@ Command diffCommand() {
       "\n"
       "Examples:\n"
       "  lumel diff out/a out/b -o out/heat\n"
-      "      all maps of all pages where both bakes are covered, a heat map for each\n"
+      "      all maps of all pages where both bakes are covered, a heat map for each; charts must lie in the same\n"
+      "      places: bakes of one scene and layout, whatever its light, materials and samples (--layout-from)\n"
       "  lumel diff a.exr b.exr -o heat.png --mask out/a/lightmap-0-aux.exr";
   command.options.positionalPath("a", a.a, "Image, or folder of a bake").placeholder = "A";
   command.options.positionalPath("b", a.b, "The reference: an image, or folder of a bake").placeholder = "B";

@@ -59,11 +59,7 @@ bool readRules(const Json& json, RememberedLayout& layout, int& firstPage) {
 /// One row of the list of charts; nothing if it is damaged. Rows without a key came with the scene's UVs.
 bool readChart(const Json& row, int firstPage, RememberedLayout& layout) {
   if (!row.is_array() || row.size() != chartColumns().size()) return false;
-  const auto column = [&row](const char* name) -> const Json& {
-    std::size_t i = 0;
-    while (chartColumns()[i] != name) ++i;
-    return row[i];
-  };
+  const auto column = [&row](const char* name) -> const Json& { return chartColumn(row, name); };
   if (column("key").is_null()) return true;
   const auto key = asKey(column("key"));
   const auto page = asInt(column("page"));

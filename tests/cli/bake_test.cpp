@@ -256,5 +256,39 @@ TEST(Diff, FiguresOfTwoBakes) {
   for (const auto& map : same) EXPECT_EQ(map["all"]["rmse"], 0.0);
 }
 
+// Texels at one place of two pages say nothing about each other where they stand for different surfaces.
+TEST(Diff, OnlyOfTheSameCharts) {
+  const auto dir = scratch();
+  nlohmann::json room = gltfOf(boxFromInside());
+  writeFile(dir / "room.gltf", room.dump());
+  writeFile(dir / "floor.gltf", gltfOf({floorQuad()}).dump());
+  const auto bake = [&](const fs::path& scene, const char* out, std::vector<std::string> options) {
+    options.insert(options.begin(), {"bake", scene, "-o", dir / out, "--page-size", "64", "--texels-per-meter", "4",
+                                     "--samples", "1", "--sky-color", "1", "1", "1"});
+    EXPECT_EQ(run(options).exitCode, 0);
+  };
+  bake(dir / "room.gltf", "room", {"--uv", "generate"});
+  bake(dir / "room.gltf", "again", {"--uv", "generate", "--seed", "2"});
+  bake(dir / "floor.gltf", "floor", {"--uv", "generate"});
+  const Outcome same = run({"diff", dir / "room", dir / "again"});
+  EXPECT_EQ(same.exitCode, 0);
+  EXPECT_EQ(same.err, "");
+  const Outcome other = run({"diff", dir / "room", dir / "floor", "-o", dir / "heat"});
+  EXPECT_EQ(other.exitCode, 3);
+  EXPECT_NE(other.err.find("no chart in the same place"), std::string::npos) << other.err;
+  EXPECT_FALSE(fs::exists(dir / "heat"));
+  // A renamed node's charts are new ones.
+  room["nodes"].push_back({{"mesh", 0}, {"name", "second"}, {"translation", {5, 0, 0}}});
+  room["scenes"][0]["nodes"].push_back(1);
+  writeFile(dir / "two.gltf", room.dump());
+  bake(dir / "two.gltf", "two", {"--uv", "generate"});
+  room["nodes"][1]["name"] = "renamed";
+  writeFile(dir / "renamed.gltf", room.dump());
+  bake(dir / "renamed.gltf", "renamed", {"--uv", "generate", "--layout-from", dir / "two"});
+  const Outcome half = run({"diff", dir / "two", dir / "renamed"});
+  EXPECT_EQ(half.exitCode, 0);
+  EXPECT_NE(half.err.find("lie in the same place in both"), std::string::npos) << half.err;
+}
+
 }  // namespace
 }  // namespace lumel::cli
