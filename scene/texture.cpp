@@ -154,16 +154,20 @@ Texture Texture::halved() const {
   const std::size_t values = 4 * static_cast<std::size_t>(half.width_) * static_cast<std::size_t>(half.height_);
   (bytes_.empty() ? half.floats_.resize(values) : half.bytes_.resize(values));
   // Texel i of n covers source texels i * size / n to (i + 1) * size / n, whose ends may lie inside one.
-  const auto share = [](int source, int i, int n, int size) {
+  const auto share = [](std::int64_t source, std::int64_t i, std::int64_t n, std::int64_t size) {
     return static_cast<float>(std::min((source + 1) * n, (i + 1) * size) - std::max(source * n, i * size)) /
            static_cast<float>(size);
+  };
+  const auto first = [](std::int64_t i, std::int64_t n, std::int64_t size) { return static_cast<int>(i * size / n); };
+  const auto end = [](std::int64_t i, std::int64_t n, std::int64_t size) {
+    return static_cast<int>(((i + 1) * size + n - 1) / n);
   };
   std::size_t out = 0;
   for (int y = 0; y < half.height_; ++y)
     for (int x = 0; x < half.width_; ++x) {
       Vec4 mean(0.0f);
-      for (int v = y * height_ / half.height_; v * half.height_ < (y + 1) * height_; ++v)
-        for (int u = x * width_ / half.width_; u * half.width_ < (x + 1) * width_; ++u)
+      for (int v = first(y, half.height_, height_); v < end(y, half.height_, height_); ++v)
+        for (int u = first(x, half.width_, width_); u < end(x, half.width_, width_); ++u)
           mean += share(u, x, half.width_, width_) * share(v, y, half.height_, height_) * fetch(u, v);
       for (int c = 0; c < 4; ++c, ++out) {
         if (bytes_.empty())

@@ -104,6 +104,16 @@ TEST(Texture, HalvedIsTheMeanOfLinearValues) {
   EXPECT_NEAR(odd.fetch(1, 0).x, (0.5f * 0.4f + 0.6f + 0.8f) / 2.5f, 1.0f / 255.0f);
 }
 
+TEST(Texture, HalvedAtTheWidestThatIsRead) {
+  Image strip(65536, 1, 1);
+  for (int x = 0; x < strip.width; ++x) strip.at(x, 0)[0] = x < 65533 ? 0.0f : 1.0f;
+  const Texture half = decoded({"strip", "", *encodePng(strip)}, ColorSpace::Linear).halved();
+  ASSERT_EQ(half.width(), 32768);
+  EXPECT_EQ(half.fetch(32765, 0).x, 0.0f);
+  EXPECT_NEAR(half.fetch(32766, 0).x, 0.5f, 0.01f);
+  EXPECT_EQ(half.fetch(32767, 0).x, 1.0f);
+}
+
 TEST(TexturePyramid, WideLookupsSeeTheMean) {
   Image stripes(64, 64, 3);
   for (int y = 0; y < 64; ++y)
