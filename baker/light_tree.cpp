@@ -4,7 +4,7 @@
 #include <bit>
 #include <cmath>
 
-#include "baker/sobol.h"
+#include "scene/sobol.h"
 
 namespace lumel {
 namespace {

@@ -4,8 +4,8 @@
 #include <bit>
 #include <limits>
 
-#include "baker/sobol.h"
 #include "scene/check.h"
+#include "scene/sobol.h"
 
 namespace lumel {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "baker/lanes.h"
-#include "baker/sobol.h"
+#include "scene/sobol.h"
 
 namespace lumel {
 

@@ -9,7 +9,7 @@
 #include <cstdint>
 
 #include "baker/lanes.h"
-#include "baker/sobol.h"
+#include "scene/sobol.h"
 
 namespace lumel {
 

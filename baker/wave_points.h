@@ -9,8 +9,8 @@
 
 #include "baker/direct_light.h"
 #include "baker/lanes.h"
-#include "baker/sobol.h"
 #include "lightmap/texels.h"
+#include "scene/sobol.h"
 
 namespace lumel {
 

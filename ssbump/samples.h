@@ -11,7 +11,7 @@ namespace lumel::ssbump {
 enum class RaySampling {
   Random,      // independent
   Stratified,  // one jittered direction in each cell of a grid over the hemisphere; same cell for the same index
-  Sobol,  // Owen-scrambled (0,2)-sequence, scrambled per texel (Burley 2020, "Practical Hash-based Owen Scrambling")
+  Sobol,       // Owen-scrambled (0,2)-sequence, scrambled per texel
 };
 
 class HemisphereSamples {

@@ -7,8 +7,8 @@
 
 #include "baker/environment_light.h"
 #include "baker/sampling.h"
-#include "baker/sobol.h"
 #include "scene/environment.h"
+#include "scene/sobol.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {

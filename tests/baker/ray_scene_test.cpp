@@ -6,7 +6,7 @@
 
 #include "baker/gather_wave.h"
 #include "baker/sampling.h"
-#include "baker/sobol.h"
+#include "scene/sobol.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {

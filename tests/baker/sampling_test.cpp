@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "baker/distribution.h"
-#include "baker/sobol.h"
 #include "lightmap/rnm_basis.h"
+#include "scene/sobol.h"
 
 namespace lumel {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "baker/sobol.h"
+#include "scene/sobol.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {

@@ -1,7 +1,7 @@
 #include "tests/bench/gather_scenes.h"
 
-#include "baker/sobol.h"
 #include "scene/check.h"
+#include "scene/sobol.h"
 
 namespace lumel::bench_scenes {
 namespace {
