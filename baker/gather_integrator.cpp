@@ -102,7 +102,7 @@ void GatherIntegrator::makeCache() {
   warmBacks_.resize(map_.size());
   if (scene_.levels.count == 0) return;
   reflectance_.resize(map_.size());
-  if (!scene_.levels.endless) cache_.resize(map_.size() * stored() + 1);  // else it is what the warm-up ends with
+  if (!scene_.levels.endless) cache_.resize(map_.size() * stored());  // else it is what the warm-up ends with
   if (!scene_.indirectOnly) return;
   direct_.resize(map_.size());
   seen_.resize(map_.size());
@@ -123,7 +123,7 @@ void GatherIntegrator::makeSums() {
 /// What texel() does not need: its place is taken by the pages of the result.
 void GatherIntegrator::dropCache() {
   reflectance_ = std::vector<Vec3>();  // `= {}` would keep the memory
-  cache_ = std::vector<Vec3>();
+  cache_ = std::vector<PackedLight>();
   levelSums_ = std::vector<Vec3>();
   direct_ = std::vector<Vec3>();
   seen_ = std::vector<Vec3>();
@@ -241,11 +241,11 @@ void GatherIntegrator::solveLinks(const WarmLinks& links, std::vector<Vec3> ligh
   const CacheLevels& levels = scene_.levels;
   const std::size_t count = map_.size();
   // What links look up: one product instead of two values from all over the memory.
-  std::vector<Vec3> reflected(count + 1);  // as cache_
+  std::vector<PackedLight> reflected(count);
   const auto reflect = [&] {
     for (const TexelMap::Substitute& s : substitutes_) light[s.texel] = light[s.source];
     parallelFor(count, kSweepGrain, [&](std::size_t first, std::size_t last) {
-      for (std::size_t t = first; t < last; ++t) reflected[t] = reflectance_[t] * light[t];
+      for (std::size_t t = first; t < last; ++t) reflected[t] = packLight(reflectance_[t] * light[t]);
     });
   };
   const auto keep = [&](int level) {
@@ -268,7 +268,7 @@ void GatherIntegrator::solveLinks(const WarmLinks& links, std::vector<Vec3> ligh
           Vec3 found(0.0f);
           for (int ray = 0; ray < GatherWave::kWarmRays; ++ray, ++index, ++link) {
             if (*link == kNoTexel) continue;
-            Vec3 from = reflected[*link];
+            Vec3 from = unpackLight(reflected[*link]);
             if (share != links.shares[w].end() && share->link == index) from *= unpackWeight(share++->weight);
             found += from;
           }
@@ -408,11 +408,11 @@ void GatherIntegrator::renewCache() {
   const std::size_t firstLevel = scene_.levels.base > 0 ? 1 : 0;
   parallelFor(map_.size(), kSweepGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t t = first; t < last; ++t)
-      for (std::size_t l = firstLevel; l < stored(); ++l) cache_[t * stored() + l] = reflectance_[t] * lightOf(t, l);
+      for (std::size_t l = firstLevel; l < stored(); ++l) cache_[t * stored() + l] = packLight(reflectance_[t] * lightOf(t, l));
   });
   for (const TexelMap::Substitute& s : substitutes_)
     for (std::size_t l = firstLevel; l < stored(); ++l)
-      cache_[s.texel * stored() + l] = reflectance_[s.texel] * lightOf(s.source, l);
+      cache_[s.texel * stored() + l] = packLight(reflectance_[s.texel] * lightOf(s.source, l));
 }
 
 void GatherIntegrator::estimateErrors() {

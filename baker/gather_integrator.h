@@ -158,7 +158,7 @@ class GatherIntegrator {
   // Of the cache alone, with indirectOnly: light from light samples; sums of what the rays of all passes saw shine.
   std::vector<Vec3> direct_;
   std::vector<Vec3> seen_;
-  std::vector<Vec3> cache_;  // levels.count per texel, and one more
+  std::vector<PackedLight> cache_;  // levels.count per texel
   std::vector<float> coverage_;
   std::vector<std::uint32_t> backFaces_;
   std::vector<std::uint8_t> buried_;     // nothing more is gathered for them

@@ -86,18 +86,17 @@ LUMEL_FOR_EACH_CPU FoundTexels sortFound(const RayPacket& packet, const std::arr
   return found;
 }
 
-LUMEL_FOR_EACH_CPU void lookUpLight(const FoundTexels& found, const Vec3* radiance, std::uint32_t stride,
+LUMEL_FOR_EACH_CPU void lookUpLight(const FoundTexels& found, const PackedLight* radiance, std::uint32_t stride,
                                     const float* pdf, Vec3Lanes& light) {
-  std::array<LaneWords, 4> columns;
-  turnRows<4>([&](std::size_t lane) { return radiance + std::size_t{found.texels[lane]} * stride; }, columns);
-  alignas(64) float reflected[3][kLanes];
-  std::memcpy(reflected, &columns, sizeof reflected);
+  static_assert(sizeof(PackedLight) == 8);
+  std::array<LaneWords, 2> columns;
+  turnRows<2>([&](std::size_t lane) { return radiance + std::size_t{found.texels[lane]} * stride; }, columns);
+  alignas(64) std::uint32_t packed[2][kLanes];
+  std::memcpy(packed, &columns, sizeof packed);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const bool isLookedUp = (found.lookedUp & (1u << lane)) != 0;
-    const float beta = kInvPi / pdf[lane];
-    light.x[lane] = pick(isLookedUp, beta * reflected[0][lane], 0.0f);
-    light.y[lane] = pick(isLookedUp, beta * reflected[1][lane], 0.0f);
-    light.z[lane] = pick(isLookedUp, beta * reflected[2][lane], 0.0f);
+    const Vec3 arriving = kInvPi / pdf[lane] * unpackLight(packed[0][lane], packed[1][lane]);
+    light.set(lane, pick(isLookedUp, arriving, Vec3(0.0f)));
   }
 }
 

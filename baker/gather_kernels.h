@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "baker/lanes.h"
+#include "baker/packed_light.h"
 #include "baker/wave_points.h"
 
 namespace lumel {
@@ -37,9 +38,8 @@ struct FoundTexels {
 /// `texels`: kNoTexel where there is none; `near`: bits of lanes that are not to be looked up.
 FoundTexels sortFound(const RayPacket& packet, const std::array<std::uint32_t, kLanes>& texels, std::uint32_t near);
 
-/// light = radiance[texel * stride] * kInvPi / pdf for the lanes that are looked up, else 0. Reads four floats at a
-/// time: there must be another Vec3 behind the last one.
-void lookUpLight(const FoundTexels& found, const Vec3* radiance, std::uint32_t stride, const float* pdf,
+/// light = radiance[texel * stride] * kInvPi / pdf for the lanes that are looked up, else 0.
+void lookUpLight(const FoundTexels& found, const PackedLight* radiance, std::uint32_t stride, const float* pdf,
                  Vec3Lanes& light);
 
 /// Sums of irradiance / pi over a few samples: of the flat map's three colours, then of those of the RNM maps.

@@ -38,7 +38,7 @@ struct WarmSink {
 /// Adds light to the maps and to the levels of the cache.
 struct GatherSink {
   const GatherScene& scene;
-  std::span<const Vec3> cache;
+  std::span<const PackedLight> cache;
   GatheredWave& result;
   std::uint32_t page;
   std::span<const TexelCoord> coords;
@@ -51,7 +51,7 @@ struct GatherSink {
   std::array<std::array<std::uint8_t, WavePoints::kMost>, kLanes> backs{};  // rays of a net that met backs, by point
 
   /// Radiance that a texel reflects, by level.
-  const Vec3* reflectedBy(std::uint32_t texel) const {
+  const PackedLight* reflectedBy(std::uint32_t texel) const {
     return cache.data() + std::size_t{texel} * static_cast<std::size_t>(scene.levels.count);
   }
   void prefetch(std::uint32_t texel) const {
@@ -105,7 +105,7 @@ struct GatherSink {
     const Vec3 weight = beta * std::max(0.0f, dirTangent.z);
     for (int level = 0; level < levels.count; ++level)
       if (const int source = levels.read(levels.base + level, depth); source >= 0)
-        result.texels[lane].levels[static_cast<std::size_t>(level)] += Vec3d(weight * reflectedBy(texel)[source]);
+        result.texels[lane].levels[static_cast<std::size_t>(level)] += Vec3d(weight * unpackLight(reflectedBy(texel)[source]));
   }
 
   // What GatherTracer asks of a sink.
@@ -119,7 +119,7 @@ struct GatherSink {
   }
   void texel(const Flight& flight, std::uint32_t texel) {
     if (const int level = scene.levels.read(scene.bounces, flight.depth); level >= 0) {
-      const Vec3 light = flight.beta * reflectedBy(texel)[level];
+      const Vec3 light = flight.beta * unpackLight(reflectedBy(texel)[level]);
       if (!isFinite(light)) return report(flight.lane, flight.sample);
       tally(flight.lane, flight.dirTangent, light);
       addToMaps(flight.lane, flight.dirTangent, light);
@@ -282,7 +282,7 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   return texels;
 }
 
-GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const Vec3> cache,
+GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const PackedLight> cache,
                                 std::span<const std::uint8_t> buried, std::span<LightSpread> spreads) {
   GatheredWave result;
   GatherSink sink{scene_, cache, result, page_, std::span(scene_.texels[page_].coords).subspan(first_, count_)};

@@ -124,10 +124,9 @@ class GatherWave {
   std::array<WarmTexel, kLanes> warmUp(std::span<CacheLink> links, GatheredWave& counts);
 
   /// Samples [first, end) of every covered texel. `cache`: levels.count values per texel of the map, the radiance
-  /// that the texel reflects, and one value more (lookUpLight). `buried`: one per texel of the wave; nothing is
-  /// gathered for those. `spreads`: what the wave remembers of its light from pass to pass: of each of
+  /// that the texel reflects. `buried`: one per texel of the wave; nothing is gathered for those. `spreads`: what the wave remembers of its light from pass to pass: of each of
   /// GatherScene::strategies, and last of the gather rays; empty without strategies.
-  GatheredWave gather(std::uint32_t first, std::uint32_t end, std::span<const Vec3> cache,
+  GatheredWave gather(std::uint32_t first, std::uint32_t end, std::span<const PackedLight> cache,
                       std::span<const std::uint8_t> buried, std::span<LightSpread> spreads);
 
  private:

@@ -50,8 +50,10 @@ struct Fixture {
         scene{.transport = light, .kernels = kernels, .atlas = grid.atlas, .texels = transport.texels, .map = map} {
     scene.levels = {.count = 1, .base = 0, .endless = true};
     scene.lastDepth = 64;
-    for (std::size_t t = 0; t <= map.size(); ++t)
-      cache.emplace_back(0.1f + unitFloat(hashBits(static_cast<std::uint32_t>(t))));
+    for (std::size_t t = 0; t < map.size(); ++t) {
+      reflected.emplace_back(0.1f + unitFloat(hashBits(static_cast<std::uint32_t>(t))));
+      cache.push_back(packLight(reflected.back()));
+    }
     const PageTexels& page = transport.texels[0];
     pixels.assign(static_cast<std::size_t>(page.width) * static_cast<std::size_t>(page.height), kNoTexel);
     for (std::size_t t = 0; t < page.size(); ++t)
@@ -68,7 +70,8 @@ struct Fixture {
   RnmKernels kernels{Projection::Flat};
   TexelMap map;
   GatherScene scene;
-  std::vector<Vec3> cache;
+  std::vector<PackedLight> cache;
+  std::vector<Vec3> reflected;        // the same for the naive loop
   std::vector<std::uint32_t> pixels;  // the naive loop's own way from a pixel to its texel
 };
 
@@ -227,7 +230,7 @@ Maps gatherNaively(const Fixture& f, std::size_t texel, std::uint32_t samples) {
     const int y = std::min(static_cast<int>(uv.y * static_cast<float>(page.height)), page.height - 1);
     const std::uint32_t found = f.pixels[f.pixelOf(x, y)];
     if (found == kNoTexel) return;
-    const Vec3 light = f.cache[found] * (kInvPi / made.pdf);
+    const Vec3 light = f.reflected[found] * (kInvPi / made.pdf);
     const Vec3 k = f.kernels(made.local);
     maps.flat += Vec3d(light * made.local.z);
     for (int i = 0; i < 3; ++i) maps.rnm[static_cast<std::size_t>(i)] += Vec3d(light * k[i]);
