@@ -122,8 +122,8 @@ void GatherIntegrator::makeSums() {
 
 /// What texel() does not need: its place is taken by the pages of the result.
 void GatherIntegrator::dropCache() {
-  reflectance_ = std::vector<Vec3>();  // `= {}` would keep the memory
-  cache_ = std::vector<PackedLight>();
+  reflectance_ = std::vector<PackedColor>();  // `= {}` would keep the memory
+  cache_ = std::vector<PackedColor>();
   levelSums_ = std::vector<Vec3>();
   direct_ = std::vector<Vec3>();
   seen_ = std::vector<Vec3>();
@@ -215,7 +215,7 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
     keepLinks(std::span(found).first(linkCount),
               std::span(links.texels).subspan(start * GatherWave::kWarmRays, linkCount), links.shares[w]);
     for (std::size_t i = 0; i < wave.count; ++i) {
-      reflectance_[start + i] = warm[i].reflectance;
+      reflectance_[start + i] = packColor(warm[i].reflectance);
       first[start + i] = warm[i].direct + warm[i].seen;
       constant[start + i] = first[start + i] + warm[i].relit;
       warmBacks_[start + i] = static_cast<std::uint8_t>(warm[i].backs);
@@ -241,11 +241,11 @@ void GatherIntegrator::solveLinks(const WarmLinks& links, std::vector<Vec3> ligh
   const CacheLevels& levels = scene_.levels;
   const std::size_t count = map_.size();
   // What links look up: one product instead of two values from all over the memory.
-  std::vector<PackedLight> reflected(count);
+  std::vector<PackedColor> reflected(count);
   const auto reflect = [&] {
     for (const TexelMap::Substitute& s : substitutes_) light[s.texel] = light[s.source];
     parallelFor(count, kSweepGrain, [&](std::size_t first, std::size_t last) {
-      for (std::size_t t = first; t < last; ++t) reflected[t] = packLight(reflectance_[t] * light[t]);
+      for (std::size_t t = first; t < last; ++t) reflected[t] = packColor(unpackColor(reflectance_[t]) * light[t]);
     });
   };
   const auto keep = [&](int level) {
@@ -268,7 +268,7 @@ void GatherIntegrator::solveLinks(const WarmLinks& links, std::vector<Vec3> ligh
           Vec3 found(0.0f);
           for (int ray = 0; ray < GatherWave::kWarmRays; ++ray, ++index, ++link) {
             if (*link == kNoTexel) continue;
-            Vec3 from = unpackLight(reflected[*link]);
+            Vec3 from = unpackColor(reflected[*link]);
             if (share != links.shares[w].end() && share->link == index) from *= unpackWeight(share++->weight);
             found += from;
           }
@@ -408,11 +408,12 @@ void GatherIntegrator::renewCache() {
   const std::size_t firstLevel = scene_.levels.base > 0 ? 1 : 0;
   parallelFor(map_.size(), kSweepGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t t = first; t < last; ++t)
-      for (std::size_t l = firstLevel; l < stored(); ++l) cache_[t * stored() + l] = packLight(reflectance_[t] * lightOf(t, l));
+      for (std::size_t l = firstLevel; l < stored(); ++l)
+        cache_[t * stored() + l] = packColor(unpackColor(reflectance_[t]) * lightOf(t, l));
   });
   for (const TexelMap::Substitute& s : substitutes_)
     for (std::size_t l = firstLevel; l < stored(); ++l)
-      cache_[s.texel * stored() + l] = packLight(reflectance_[s.texel] * lightOf(s.source, l));
+      cache_[s.texel * stored() + l] = packColor(unpackColor(reflectance_[s.texel]) * lightOf(s.source, l));
 }
 
 void GatherIntegrator::estimateErrors() {

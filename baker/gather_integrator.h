@@ -154,11 +154,11 @@ class GatherIntegrator {
   std::vector<std::size_t> firstWave_;  // per page
   TexelLight sums_;                     // over all samples so far
   std::vector<Vec3> levelSums_;         // levels.count per texel, unless endless
-  std::vector<Vec3> reflectance_;
+  std::vector<PackedColor> reflectance_;
   // Of the cache alone, with indirectOnly: light from light samples; sums of what the rays of all passes saw shine.
   std::vector<Vec3> direct_;
   std::vector<Vec3> seen_;
-  std::vector<PackedLight> cache_;  // levels.count per texel
+  std::vector<PackedColor> cache_;  // levels.count per texel
   std::vector<float> coverage_;
   std::vector<std::uint32_t> backFaces_;
   std::vector<std::uint8_t> buried_;     // nothing more is gathered for them

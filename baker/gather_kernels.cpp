@@ -86,16 +86,16 @@ LUMEL_FOR_EACH_CPU FoundTexels sortFound(const RayPacket& packet, const std::arr
   return found;
 }
 
-LUMEL_FOR_EACH_CPU void lookUpLight(const FoundTexels& found, const PackedLight* radiance, std::uint32_t stride,
+LUMEL_FOR_EACH_CPU void lookUpLight(const FoundTexels& found, const PackedColor* radiance, std::uint32_t stride,
                                     const float* pdf, Vec3Lanes& light) {
-  static_assert(sizeof(PackedLight) == 8);
+  static_assert(sizeof(PackedColor) == 8);
   std::array<LaneWords, 2> columns;
   turnRows<2>([&](std::size_t lane) { return radiance + std::size_t{found.texels[lane]} * stride; }, columns);
   alignas(64) std::uint32_t packed[2][kLanes];
   std::memcpy(packed, &columns, sizeof packed);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const bool isLookedUp = (found.lookedUp & (1u << lane)) != 0;
-    const Vec3 arriving = kInvPi / pdf[lane] * unpackLight(packed[0][lane], packed[1][lane]);
+    const Vec3 arriving = kInvPi / pdf[lane] * unpackColor(packed[0][lane], packed[1][lane]);
     light.set(lane, pick(isLookedUp, arriving, Vec3(0.0f)));
   }
 }

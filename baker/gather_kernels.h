@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "baker/lanes.h"
-#include "baker/packed_light.h"
+#include "baker/packed_color.h"
 #include "baker/wave_points.h"
 
 namespace lumel {
@@ -39,7 +39,7 @@ struct FoundTexels {
 FoundTexels sortFound(const RayPacket& packet, const std::array<std::uint32_t, kLanes>& texels, std::uint32_t near);
 
 /// light = radiance[texel * stride] * kInvPi / pdf for the lanes that are looked up, else 0.
-void lookUpLight(const FoundTexels& found, const PackedLight* radiance, std::uint32_t stride, const float* pdf,
+void lookUpLight(const FoundTexels& found, const PackedColor* radiance, std::uint32_t stride, const float* pdf,
                  Vec3Lanes& light);
 
 /// Sums of irradiance / pi over a few samples: of the flat map's three colours, then of those of the RNM maps.

@@ -13,6 +13,7 @@
 
 #include "baker/direct_light.h"
 #include "baker/light_transport.h"
+#include "baker/packed_color.h"
 #include "baker/sampling.h"
 #include "baker/texel_cache.h"
 
@@ -40,8 +41,8 @@ class GatherTracer {
  public:
   /// Hits at depth `lastDepth` bring their own emission alone. `reflectance`: of the texels, where it is known; else
   /// empty. It is what the back of a surface with a lightmap reflects, as its front does.
-  GatherTracer(const LightTransport& transport, const TexelMap& map, std::span<const Vec3> reflectance, int lastDepth,
-               Sink& sink)
+  GatherTracer(const LightTransport& transport, const TexelMap& map, std::span<const PackedColor> reflectance,
+               int lastDepth, Sink& sink)
       : transport_(transport), map_(map), reflectance_(reflectance), lastDepth_(lastDepth), sink_(sink) {}
 
   /// What the rays of a packet found; flightOf(lane) tells of each.
@@ -51,43 +52,30 @@ class GatherTracer {
     map_.findAll(packet, lookup);
     for (const std::uint32_t texel : lookup.texels)
       if (texel != kNoTexel) sink_.prefetch(texel);
-    for (int lane = 0; lane < kLanes; ++lane) {
-      if (!packet.valid[lane]) continue;
-      const Flight& flight = flightOf(lane);
-      const std::uint32_t texel = lookup.texels[static_cast<std::size_t>(lane)];
-      if (texel != kNoTexel && flight.depth < lastDepth_)
-        sink_.texel(flight, texel);
-      else
-        arrive(packet, lane, flight);
-    }
+    for (int lane = 0; lane < kLanes; ++lane)
+      if (packet.valid[lane]) arrive(packet, lane, flightOf(lane), lookup);
   }
 
   /// What a traced ray found. Precondition: packet.valid[lane].
-  void arrive(const RayPacket& packet, int lane, const Flight& flight) {
+  void arrive(const RayPacket& packet, int lane, const Flight& flight, const TexelMap::Lookup& lookup) {
     if (!packet.hit(lane)) {
       if (transport_.environment.shines())
         sink_.light(flight, transport_.environment.arriving(packet.direction(lane), flight.pdf), flight.depth);
       return;
     }
-    const std::uint32_t part = transport_.rays.partOf(packet, lane);
-    const bool emits = transport_.rays.parts()[part].firstEmitter >= 0;
-    const std::uint32_t texel = flight.depth < lastDepth_ ? map_.find(part, packet, lane) : kNoTexel;
-    if (!emits && texel != kNoTexel) {
-      sink_.texel(flight, texel);
-      return;
+    const bool behind = (lookup.behind >> lane & 1u) != 0;
+    const std::uint32_t texel = lookup.texels[static_cast<std::size_t>(lane)];
+    if ((lookup.others >> lane & 1u) != 0) {
+      const ScenePart& part = transport_.rays.parts()[lookup.parts[static_cast<std::size_t>(lane)]];
+      if (flight.depth == 0 && behind && !transport_.materials.material(part.primitive->material).doubleSided)
+        sink_.backFace(flight);
+      if (part.firstEmitter >= 0) findEmission(packet, lane, flight);
     }
-    const HitSurface hit = transport_.rays.surfaceAt(packet, lane);
-    if (flight.depth == 0 && hit.backFace && !transport_.materials.material(hit.material).doubleSided)
-      sink_.backFace(flight);
-    if (emits) {
-      const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
-      if (emitted != Vec3(0.0f))
-        sink_.light(flight, emitted * misWeight(flight.pdf, transport_.emissive.pdf(hit, flight.origin)), flight.depth);
-    }
-    if (texel != kNoTexel)
+    if (flight.depth >= lastDepth_) return;
+    if (texel != kNoTexel && !behind)
       sink_.texel(flight, texel);
-    else if (flight.depth < lastDepth_)
-      leaveToShade(flight, packet, lane, albedoAt(part, packet, lane, hit.point));
+    else
+      arriveNear(packet, lane, flight, texel);
   }
 
   /// In two steps: brings closer what shading the hit will read.
@@ -97,20 +85,28 @@ class GatherTracer {
     if (!reflectance_.empty() && texel != kNoTexel) __builtin_prefetch(&reflectance_[texel]);
   }
 
-  /// Shades the hit on the spot, although it has a texel.
+  /// Shades the hit on the spot, although it may have a texel.
   void arriveNear(const RayPacket& packet, int lane, const Flight& flight, std::uint32_t texel) {
     leaveToShade(flight, packet, lane,
-                 reflectance_.empty() ? transport_.materials.albedo(transport_.rays.pointAt(packet, lane))
-                                      : reflectance_[texel]);
+                 reflectance_.empty() || texel == kNoTexel
+                     ? transport_.materials.albedo(transport_.rays.pointAt(packet, lane))
+                     : unpackColor(reflectance_[texel]));
   }
 
-  /// Follows what was left to be shaded on the spot, while it fills packets.
-  void shadeFull() {
-    while (spots_.size() >= kLanes) shade(kLanes);
+  /// One step with what was left to be shaded on the spot, once it fills packets: these are traced, and what their rays
+  /// find is looked up, each step asking memory for what the next one reads.
+  void advance() {
+    do {
+      step();
+    } while (spots_.size() >= kManySpots);
   }
   /// Follows all.
   void finish() {
-    while (!spots_.empty()) shade(std::min<std::size_t>(kLanes, spots_.size()));
+    while (stage_ != Stage::Idle || spots_.size() >= kLanes) step();
+    while (!spots_.empty()) {
+      shade(std::min<std::size_t>(kLanes, spots_.size()));
+      while (stage_ != Stage::Idle) step();
+    }
   }
 
   std::uint64_t rays() const { return rays_; }
@@ -121,6 +117,8 @@ class GatherTracer {
     Flight flight;  // beta includes the albedo
     HitCorners hit;
   };
+  enum class Stage { Idle, Traced, Placed, Found };
+  static constexpr std::size_t kManySpots = 2 * kLanes;
   static constexpr int kRouletteAfter = 4;
   static constexpr std::uint32_t kDirection = kLightPatterns;
   static constexpr std::uint32_t kRoulette = kLightPatterns + 1;
@@ -130,10 +128,11 @@ class GatherTracer {
     return {flight.key, static_cast<std::uint32_t>(flight.depth), 0u, 0u};
   }
 
-  Vec3 albedoAt(std::uint32_t part, const RayPacket& packet, int lane, const TrianglePoint& point) const {
-    if (!reflectance_.empty())
-      if (const std::uint32_t texel = map_.under(part, packet, lane); texel != kNoTexel) return reflectance_[texel];
-    return transport_.materials.albedo(point);
+  void findEmission(const RayPacket& packet, int lane, const Flight& flight) {
+    const HitSurface hit = transport_.rays.surfaceAt(packet, lane);
+    const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
+    if (emitted != Vec3(0.0f))
+      sink_.light(flight, emitted * misWeight(flight.pdf, transport_.emissive.pdf(hit, flight.origin)), flight.depth);
   }
 
   void leaveToShade(const Flight& flight, const RayPacket& packet, int lane, const Vec3& albedo) {
@@ -152,16 +151,41 @@ class GatherTracer {
     transport_.rays.cornersAt(packet, lane, spot.hit);
   }
 
-  /// The last `count` spots.
+  void step() {
+    switch (stage_) {
+      case Stage::Idle:
+        if (spots_.size() >= kLanes) shade(kLanes);
+        break;
+      case Stage::Traced:
+        map_.findPixels(packet_, lookup_);
+        forEachLane(lookup_.others, [&](std::size_t lane) { expectSpot(packet_, static_cast<int>(lane)); });
+        stage_ = Stage::Placed;
+        break;
+      case Stage::Placed:
+        map_.findTexels(lookup_);
+        for (const std::uint32_t texel : lookup_.texels)
+          if (texel != kNoTexel) sink_.prefetch(texel);
+        forEachLane(lookup_.others,
+                    [&](std::size_t lane) { expectSpot(packet_, static_cast<int>(lane), lookup_.texels[lane]); });
+        stage_ = Stage::Found;
+        break;
+      case Stage::Found:
+        for (int lane = 0; lane < kLanes; ++lane)
+          if (packet_.valid[lane]) arrive(packet_, lane, flights_[static_cast<std::size_t>(lane)], lookup_);
+        stage_ = Stage::Idle;
+        break;
+    }
+  }
+
+  /// The last `count` spots. Precondition: no rays are under way.
   void shade(std::size_t count) {
     HitCornerLanes hits;
     SampleLanes samples;
-    std::array<Flight, kLanes> flights;
     std::array<std::uint32_t, kLanes> keys{}, depths{};
     for (std::size_t lane = 0; lane < count; ++lane) {
       const Spot& spot = spots_[spots_.size() - count + lane];
       transport_.rays.set(hits, lane, spot.hit);
-      flights[lane] = spot.flight;
+      flights_[lane] = spot.flight;
       keys[lane] = spot.flight.key;
       depths[lane] = static_cast<std::uint32_t>(spot.flight.depth);
       samples.setSample(static_cast<int>(lane), spot.flight.sample);
@@ -171,31 +195,37 @@ class GatherTracer {
     Vec3Lanes p, ng, ns, rayStart;
     receiveAt(hits, p, ng, ns, rayStart);
     const ReceiverLanes receivers{hits.active, p, ng, ns, rayStart};
-    shadowRays_ += directLight(transport_, receivers, samples, 0, TraceMode::Packet, kCosineDensity,
-                               [&](int lane, const Vec3& wi, const Vec3& light) {
-                                 const auto l = static_cast<std::size_t>(lane);
-                                 sink_.light(flights[l], light * (glm::dot(wi, ns[l]) * kInvPi), flights[l].depth + 1);
-                               });
+    shadowRays_ +=
+        directLight(transport_, receivers, samples, 0, TraceMode::Packet, kCosineDensity,
+                    [&](int lane, const Vec3& wi, const Vec3& light) {
+                      const auto l = static_cast<std::size_t>(lane);
+                      sink_.light(flights_[l], light * (glm::dot(wi, ns[l]) * kInvPi), flights_[l].depth + 1);
+                    });
     alignas(64) float pdf[kLanes];
     aimByCosine(receivers, samples.draw2D(kDirection), packet_, pdf);
     for (std::size_t lane = 0; lane < count; ++lane) {
       if (!packet_.valid[lane]) continue;
-      ++flights[lane].depth;
-      flights[lane].origin = p[lane];
-      flights[lane].pdf = pdf[lane];
+      ++flights_[lane].depth;
+      flights_[lane].origin = p[lane];
+      flights_[lane].pdf = pdf[lane];
       ++rays_;
     }
     transport_.rays.intersect(packet_, TraceMode::Packet);
-    arriveAll(packet_, [&](int lane) -> const Flight& { return flights[static_cast<std::size_t>(lane)]; });
+    map_.findTriangles(packet_, lookup_);
+    stage_ = Stage::Traced;
   }
 
   const LightTransport& transport_;
   const TexelMap& map_;
-  const std::span<const Vec3> reflectance_;
+  const std::span<const PackedColor> reflectance_;
   const int lastDepth_;
   Sink& sink_;
   std::vector<Spot> spots_;
-  RayPacket packet_;  // of rays that go on
+  // Rays that go on, and what is known of where they ended.
+  Stage stage_ = Stage::Idle;
+  RayPacket packet_;
+  TexelMap::Lookup lookup_;
+  std::array<Flight, kLanes> flights_;
   std::uint64_t rays_ = 0;
   std::uint64_t shadowRays_ = 0;
 };

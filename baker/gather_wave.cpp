@@ -38,7 +38,7 @@ struct WarmSink {
 /// Adds light to the maps and to the levels of the cache.
 struct GatherSink {
   const GatherScene& scene;
-  std::span<const PackedLight> cache;
+  std::span<const PackedColor> cache;
   GatheredWave& result;
   std::uint32_t page;
   std::span<const TexelCoord> coords;
@@ -51,7 +51,7 @@ struct GatherSink {
   std::array<std::array<std::uint8_t, WavePoints::kMost>, kLanes> backs{};  // rays of a net that met backs, by point
 
   /// Radiance that a texel reflects, by level.
-  const PackedLight* reflectedBy(std::uint32_t texel) const {
+  const PackedColor* reflectedBy(std::uint32_t texel) const {
     return cache.data() + std::size_t{texel} * static_cast<std::size_t>(scene.levels.count);
   }
   void prefetch(std::uint32_t texel) const {
@@ -105,7 +105,8 @@ struct GatherSink {
     const Vec3 weight = beta * std::max(0.0f, dirTangent.z);
     for (int level = 0; level < levels.count; ++level)
       if (const int source = levels.read(levels.base + level, depth); source >= 0)
-        result.texels[lane].levels[static_cast<std::size_t>(level)] += Vec3d(weight * unpackLight(reflectedBy(texel)[source]));
+        result.texels[lane].levels[static_cast<std::size_t>(level)] +=
+            Vec3d(weight * unpackColor(reflectedBy(texel)[source]));
   }
 
   // What GatherTracer asks of a sink.
@@ -119,7 +120,7 @@ struct GatherSink {
   }
   void texel(const Flight& flight, std::uint32_t texel) {
     if (const int level = scene.levels.read(scene.bounces, flight.depth); level >= 0) {
-      const Vec3 light = flight.beta * unpackLight(reflectedBy(texel)[level]);
+      const Vec3 light = flight.beta * unpackColor(reflectedBy(texel)[level]);
       if (!isFinite(light)) return report(flight.lane, flight.sample);
       tally(flight.lane, flight.dirTangent, light);
       addToMaps(flight.lane, flight.dirTangent, light);
@@ -282,7 +283,7 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   return texels;
 }
 
-GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const PackedLight> cache,
+GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
                                 std::span<const std::uint8_t> buried, std::span<LightSpread> spreads) {
   GatheredWave result;
   GatherSink sink{scene_, cache, result, page_, std::span(scene_.texels[page_].coords).subspan(first_, count_)};
@@ -387,7 +388,7 @@ void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
     }
     if (inFlight(3)) {
       collect(packet(3), tracer, sink);
-      tracer.shadeFull();
+      tracer.advance();
       // Sums of a few samples lose nothing as floats.
       if ((packet(3).cell & 15u) == 15u) settle(sink.sums, sink.totals);
     }
@@ -417,13 +418,13 @@ void GatherWave::launch(Packet& packet) {
 
 /// Asks memory for what collect() will read of a packet whose triangles are found, and then whose texels are.
 void GatherWave::expectSpots(const Packet& packet, const GatherTracer<GatherSink>& tracer) {
-  forEachLane(packet.lookup.onTheSpot,
+  forEachLane(packet.lookup.others | packet.lookup.near,
               [&](std::size_t lane) { tracer.expectSpot(packet.rays.packet, static_cast<int>(lane)); });
 }
 void GatherWave::expectLight(const Packet& packet, const GatherTracer<GatherSink>& tracer, const GatherSink& sink) {
   const TexelMap::Lookup& lookup = packet.lookup;
   for (const std::uint32_t texel : lookup.texels) sink.prefetch(texel != kNoTexel ? texel : 0u);
-  forEachLane(lookup.onTheSpot, [&](std::size_t lane) {
+  forEachLane(lookup.others | lookup.near, [&](std::size_t lane) {
     tracer.expectSpot(packet.rays.packet, static_cast<int>(lane), lookup.texels[lane]);
   });
 }
@@ -432,7 +433,8 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
   const AimedRays& rays = packet.rays;
   const TexelMap::Lookup& lookup = packet.lookup;
   const int level = scene_.levels.read(scene_.bounces, 0);
-  const FoundTexels found = sortFound(rays.packet, lookup.texels, level >= 0 ? lookup.onTheSpot : 0u);
+  const FoundTexels found =
+      sortFound(rays.packet, lookup.texels, level >= 0 ? lookup.others | lookup.near : lookup.others);
   sink.result.rays += static_cast<std::uint64_t>(std::popcount(found.lookedUp | found.others | found.missed));
   Vec3Lanes light;
   if (level >= 0)
@@ -443,10 +445,10 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
     });
   forEachLane(found.others, [&](std::size_t lane) {
     const Flight flight = flightOf(lane, net_.sample(packet.cell, lane), points_[pointOf(packet.cell)], rays);
-    if (const std::uint32_t texel = lookup.texels[lane]; texel != kNoTexel)
-      return tracer.arriveNear(rays.packet, static_cast<int>(lane), flight, texel);
+    if ((lookup.others >> lane & 1u) == 0)
+      return tracer.arriveNear(rays.packet, static_cast<int>(lane), flight, lookup.texels[lane]);
     sink.point = pointOf(packet.cell) % WavePoints::kMost;
-    tracer.arrive(rays.packet, static_cast<int>(lane), flight);
+    tracer.arrive(rays.packet, static_cast<int>(lane), flight, lookup);
   });
   if (found.missed != 0 && scene_.transport.environment.shines()) collectSky(rays, found.missed, light, sink);
   if (sink.tallied)

@@ -48,9 +48,9 @@ struct GatherScene {
   int lastDepth = 0;  // GatherTracer
   CacheLevels levels{};
   bool indirectOnly = false;
-  std::optional<TraceMode> gatherMode{};    // of the texels' rays; else as CoherencePilot says
-  std::vector<LightStrategy> strategies{};  // of the texels' own light
-  std::span<const Vec3> reflectance{};      // of the map's texels, once the warm-up has found it
+  std::optional<TraceMode> gatherMode{};       // of the texels' rays; else as CoherencePilot says
+  std::vector<LightStrategy> strategies{};     // of the texels' own light
+  std::span<const PackedColor> reflectance{};  // of the map's texels, once the warm-up has found it
 };
 
 /// Chooses how the next packet is traced by what those before it hit: where many rays of a packet find the triangle
@@ -124,9 +124,10 @@ class GatherWave {
   std::array<WarmTexel, kLanes> warmUp(std::span<CacheLink> links, GatheredWave& counts);
 
   /// Samples [first, end) of every covered texel. `cache`: levels.count values per texel of the map, the radiance
-  /// that the texel reflects. `buried`: one per texel of the wave; nothing is gathered for those. `spreads`: what the wave remembers of its light from pass to pass: of each of
-  /// GatherScene::strategies, and last of the gather rays; empty without strategies.
-  GatheredWave gather(std::uint32_t first, std::uint32_t end, std::span<const PackedLight> cache,
+  /// that the texel reflects. `buried`: one per texel of the wave; nothing is gathered for those. `spreads`: what the
+  /// wave remembers of its light from pass to pass: of each of GatherScene::strategies, and last of the gather rays;
+  /// empty without strategies.
+  GatheredWave gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
                       std::span<const std::uint8_t> buried, std::span<LightSpread> spreads);
 
  private:

@@ -76,9 +76,8 @@ TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<P
     }
   }
 
-  for (const ScenePart& part : rays.parts()) lookedUp_.push_back({.frontSign = part.frontSign});
-  lookedUp_.emplace_back();
-  firstTriangle_.resize(rays.parts().size(), kNowhere);
+  for (const ScenePart& part : rays.parts()) parts_.push_back({.frontSign = part.frontSign});
+  parts_.emplace_back();
   triangles_.emplace_back();
   // Instances and primitives number surfaces; parts leave out what rays cannot hit.
   std::map<std::pair<int, const Primitive*>, std::uint32_t> partOf;
@@ -92,12 +91,11 @@ TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<P
 
 void TexelMap::addSurface(std::uint32_t part, const Surface& surface) {
   const ScenePart& source = rays_.parts()[part];
-  std::uint32_t& first = firstTriangle_[part];
+  std::uint32_t& first = parts_[part].firstTriangle;
   if (first == kNowhere) {
     LUMEL_CHECK(triangles_.size() + source.primitive->triangleCount() < kNoTexel);
     first = static_cast<std::uint32_t>(triangles_.size());
     triangles_.resize(triangles_.size() + source.primitive->triangleCount());
-    if (source.firstEmitter < 0) lookedUp_[part].firstTriangle = first;
   }
   const PageMap& page = pages_[static_cast<std::size_t>(surface.page) + 1];
   for (std::size_t t = 0; t < surface.triangleCount(); ++t) {
@@ -110,8 +108,9 @@ void TexelMap::addSurface(std::uint32_t part, const Surface& surface) {
         if (surface.sourceVertex[vertex] == sourceCorner[i])
           pixels[i] = surface.lightmapUvs[vertex] * Vec2(page.width, page.height);
       }
-    triangles_[std::size_t{first} + sourceTriangle] = {pixels[0], pixels[1] - pixels[0], pixels[2] - pixels[0],
-                                                       page.firstTile, texelWidth(surface, t, pixels)};
+    triangles_[std::size_t{first} + sourceTriangle] = {
+        pixels[0], pixels[1] - pixels[0], pixels[2] - pixels[0], page.firstTile,
+        source.firstEmitter < 0 ? texelWidth(surface, t, pixels) : kShines};
   }
 }
 
@@ -136,13 +135,12 @@ std::uint32_t TexelMap::at(const PageMap& page, int x, int y) const {
   return (tile.covered & bit) != 0 ? tile.first + countBits(tile.covered & (bit - 1u)) : kNoTexel;
 }
 
+/// Of a hit on an instance, whose normal Embree gives in the space that its triangles are in.
 bool TexelMap::fromBehind(std::uint32_t part, const RayPacket& packet, int lane) const {
   const RTCHit16& hit = packet.rayhit.hit;
   const ScenePart& source = rays_.parts()[part];
   const Vec3 ng(hit.Ng_x[lane], hit.Ng_y[lane], hit.Ng_z[lane]);
-  // Embree gives the normal in the space that its triangles are in.
-  const Vec3 front = source.worldPositions ? ng * source.frontSign : source.worldFromNormal * ng;
-  return glm::dot(packet.direction(lane), front) > 0.0f;
+  return glm::dot(packet.direction(lane), source.worldFromNormal * ng) > 0.0f;
 }
 
 /// A point on a chart's border may round to the texel beside it.
@@ -156,22 +154,6 @@ std::uint32_t TexelMap::texelBeside(const PageMap& page, const Vec2& pixel) cons
   return kNoTexel;
 }
 
-std::uint32_t TexelMap::find(std::uint32_t part, const RayPacket& packet, int lane) const {
-  return fromBehind(part, packet, lane) ? kNoTexel : under(part, packet, lane);
-}
-
-std::uint32_t TexelMap::under(std::uint32_t part, const RayPacket& packet, int lane) const {
-  const std::uint32_t first = firstTriangle_[part];
-  if (first == kNowhere) return kNoTexel;
-  const RTCHit16& hit = packet.rayhit.hit;
-  const Triangle& triangle = triangles_[std::size_t{first} + hit.primID[lane]];
-  if (triangle.firstTile == kNowhere) return kNoTexel;
-  const PageMap& page = pageOf(triangle);
-  const Vec2 pixel = triangle.at(hit.u[lane], hit.v[lane]);
-  const std::uint32_t texel = at(page, static_cast<int>(std::floor(pixel.x)), static_cast<int>(std::floor(pixel.y)));
-  return texel != kNoTexel ? texel : texelBeside(page, pixel);
-}
-
 LUMEL_FOR_EACH_CPU void TexelMap::chooseTriangles(const RayPacket& packet, const PartMap* parts, Lookup& lookup) {
   const RTCRay16& ray = packet.rayhit.ray;
   const RTCHit16& hit = packet.rayhit.hit;
@@ -181,29 +163,30 @@ LUMEL_FOR_EACH_CPU void TexelMap::chooseTriangles(const RayPacket& packet, const
   alignas(64) float signs[kLanes];
   std::memcpy(firsts, &columns[0], sizeof firsts);
   std::memcpy(signs, &columns[1], sizeof signs);
+  std::uint32_t behind = 0;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const float along = glm::dot(Vec3(ray.dir_x[lane], ray.dir_y[lane], ray.dir_z[lane]),
                                  Vec3(hit.Ng_x[lane], hit.Ng_y[lane], hit.Ng_z[lane]));
-    const bool isFound = (firsts[lane] != kNowhere) & !(along * signs[lane] > 0.0f);
-    lookup.triangles[lane] = isFound ? firsts[lane] + hit.primID[lane] : kNowhere;
+    behind |= along * signs[lane] > 0.0f ? 1u << lane : 0u;
+    lookup.triangles[lane] = firsts[lane] != kNowhere ? firsts[lane] + hit.primID[lane] : kNowhere;
   }
+  lookup.behind = behind;
 }
 
 void TexelMap::findTriangles(const RayPacket& packet, Lookup& lookup) const {
-  const auto none = static_cast<std::uint32_t>(lookedUp_.size() - 1);
+  const auto none = static_cast<std::uint32_t>(parts_.size() - 1);
   if (!placesInstances_)
     geometriesOf(packet, none, lookup.parts);
   else
     for (int lane = 0; lane < kLanes; ++lane)
       lookup.parts[static_cast<std::size_t>(lane)] = packet.hit(lane) ? rays_.partOf(packet, lane) : none;
-  chooseTriangles(packet, lookedUp_.data(), lookup);
+  chooseTriangles(packet, parts_.data(), lookup);
   if (placesInstances_)
     for (int lane = 0; lane < kLanes; ++lane) {
-      const auto l = static_cast<std::size_t>(lane);
-      const std::uint32_t part = lookup.parts[l];
+      const std::uint32_t part = lookup.parts[static_cast<std::size_t>(lane)];
       if (part == none || rays_.parts()[part].worldPositions) continue;
-      const bool isFound = lookedUp_[part].firstTriangle != kNowhere && !fromBehind(part, packet, lane);
-      lookup.triangles[l] = isFound ? lookedUp_[part].firstTriangle + packet.rayhit.hit.primID[lane] : kNowhere;
+      const std::uint32_t bit = 1u << lane;
+      lookup.behind = fromBehind(part, packet, lane) ? lookup.behind | bit : lookup.behind & ~bit;
     }
   for (const std::uint32_t triangle : lookup.triangles) __builtin_prefetch(triangles_.data() + triangle);
 }
@@ -216,7 +199,7 @@ LUMEL_FOR_EACH_CPU void TexelMap::placePixels(const RayPacket& packet, const Tri
   alignas(64) std::uint32_t firstTile[kLanes];
   std::memcpy(of, &columns, sizeof of);
   std::memcpy(firstTile, &columns[6], sizeof firstTile);
-  std::uint32_t onTheSpot = 0;
+  std::uint32_t hits = 0, others = 0, near = 0;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const bool isFound = lookup.triangles[lane] != kNowhere;
     const float u = pick(isFound, packet.rayhit.hit.u[lane], 0.0f), v = pick(isFound, packet.rayhit.hit.v[lane], 0.0f);
@@ -229,11 +212,16 @@ LUMEL_FOR_EACH_CPU void TexelMap::placePixels(const RayPacket& packet, const Tri
     lookup.y[lane] = y;
     const bool isHit = (packet.valid[lane] != 0) & (packet.rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID);
     const bool isNear = packet.rayhit.ray.tfar[lane] < Lookup::kNearTexels * of[7][lane];
-    onTheSpot |= isHit & (isNear | !isFound) ? 1u << lane : 0u;
+    const std::uint32_t bit = 1u << lane;
+    hits |= isHit ? bit : 0u;
+    others |= !isFound | (of[7][lane] == kShines) ? bit : 0u;
+    near |= isNear ? bit : 0u;
     lookup.bits[lane] = tileBit(column, row);
     lookup.tiles[lane] = firstTile[lane] + row / 4 * tilesAcross + column / 4;
   }
-  lookup.onTheSpot = onTheSpot;
+  lookup.behind &= hits;
+  lookup.others = (others & hits) | lookup.behind;
+  lookup.near = near & hits;
 }
 
 void TexelMap::findPixels(const RayPacket& packet, Lookup& lookup) const {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -26,16 +27,8 @@ class TexelMap {
   std::uint32_t firstOfPage(std::size_t page) const { return firstOfPage_[page]; }
   std::size_t pageOf(std::uint32_t texel) const;
 
-  /// The texel that holds the light at a ray's hit on RayScene::parts()[part], or kNoTexel: the part has no lightmap,
-  /// its back was hit, or the point lies (by rounding) beside all texels of the page. Precondition: packet.hit(lane).
-  std::uint32_t find(std::uint32_t part, const RayPacket& packet, int lane) const;
-
-  /// The same from either side.
-  std::uint32_t under(std::uint32_t part, const RayPacket& packet, int lane) const;
-
-  /// The same as find for all lanes of a packet, in three steps: each asks memory for what the next one reads, so that
-  /// a caller can do other work in between. The result is `texels`: kNoTexel also where nothing was hit, or something
-  /// that shines by itself.
+  /// The texels that the rays of a packet end on, in three steps: each asks memory for what the next one reads, so that
+  /// a caller can do other work in between.
   struct Lookup;
   void findTriangles(const RayPacket& packet, Lookup& lookup) const;
   void findPixels(const RayPacket& packet, Lookup& lookup) const;
@@ -63,12 +56,10 @@ class TexelMap {
   struct alignas(32) Triangle {
     Vec2 pixel{0}, perU{0}, perV{0};     // on the page: of the first corner, and how it moves with the barycentrics
     std::uint32_t firstTile = kNowhere;  // of the page
-    float texelMeters = 0.0f;            // width of a texel on the surface
-
-    Vec2 at(float u, float v) const { return pixel + u * perU + v * perV; }
+    float texelMeters = 0.0f;            // width of a texel on the surface; kShines: hits bring emission
   };
   struct PartMap {
-    std::uint32_t firstTriangle = kNowhere;  // into triangles_; kNowhere: no lightmap, or it shines
+    std::uint32_t firstTriangle = kNowhere;  // into triangles_; kNowhere: no lightmap
     float frontSign = 0.0f;                  // ScenePart::frontSign
   };
   struct PageMap {
@@ -84,6 +75,7 @@ class TexelMap {
   };
   /// Triangle, page and tile that stand for having none: lookups need no branches.
   static constexpr std::uint32_t kNowhere = 0;
+  static constexpr float kShines = std::numeric_limits<float>::infinity();
 
   void addSurface(std::uint32_t part, const Surface& surface);
   static void chooseTriangles(const RayPacket& packet, const PartMap* parts, Lookup& lookup);
@@ -108,21 +100,24 @@ class TexelMap {
   std::vector<PageMap> pages_;              // from 1 on
   std::uint32_t tilesAcross_ = 0;           // of all pages, so that lookups need not know which
   std::vector<Tile> tiles_;
-  std::vector<PartMap> lookedUp_;             // per part, for lookups; the last one is for rays that hit nothing
-  std::vector<std::uint32_t> firstTriangle_;  // per part, shining ones too
+  std::vector<PartMap> parts_;  // of RayScene::parts; the last one is for rays that hit nothing
   std::vector<Triangle> triangles_;
 };
 
 struct TexelMap::Lookup {
+  /// The texel at the hit, from either side; kNoTexel: nothing was hit, the part has no lightmap, or the point lies (by
+  /// rounding) beside all texels of the page.
   alignas(64) std::array<std::uint32_t, kLanes> texels;
-  /// Bits of the lanes whose hit is to be shaded on the spot: it has no texel, or the ray is shorter than kNearTexels
-  /// texels of what it hit, and one value for a whole texel too coarse.
-  std::uint32_t onTheSpot;
+  alignas(64) std::array<std::uint32_t, kLanes> parts;  // of RayScene::parts, where there is a hit
+  // Bits of lanes:
+  std::uint32_t behind;  // the hit is on the back
+  std::uint32_t
+      others;          // the texel does not tell all: the hit is on the back, on what shines by itself or has no texel
+  std::uint32_t near;  // the ray is shorter than kNearTexels texels of what it hit: one value is too coarse
   static constexpr float kNearTexels = 1.5f;
 
  private:
   friend TexelMap;
-  alignas(64) std::array<std::uint32_t, kLanes> parts;
   alignas(64) std::array<std::uint32_t, kLanes> triangles;
   alignas(64) std::array<std::uint32_t, kLanes> tiles;
   alignas(64) std::array<std::uint32_t, kLanes> bits;  // of the pixel in its tile

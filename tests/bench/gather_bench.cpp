@@ -52,7 +52,7 @@ struct Fixture {
     scene.lastDepth = 64;
     for (std::size_t t = 0; t < map.size(); ++t) {
       reflected.emplace_back(0.1f + unitFloat(hashBits(static_cast<std::uint32_t>(t))));
-      cache.push_back(packLight(reflected.back()));
+      cache.push_back(packColor(reflected.back()));
     }
     const PageTexels& page = transport.texels[0];
     pixels.assign(static_cast<std::size_t>(page.width) * static_cast<std::size_t>(page.height), kNoTexel);
@@ -70,7 +70,7 @@ struct Fixture {
   RnmKernels kernels{Projection::Flat};
   TexelMap map;
   GatherScene scene;
-  std::vector<PackedLight> cache;
+  std::vector<PackedColor> cache;
   std::vector<Vec3> reflected;        // the same for the naive loop
   std::vector<std::uint32_t> pixels;  // the naive loop's own way from a pixel to its texel
 };
