@@ -118,7 +118,8 @@ float Materials::opacity(const TrianglePoint& point) const {
 bool Materials::needsAlphaTest(const Primitive& primitive) const {
   const Material& m = material(primitive.material);
   if (m.alphaMode == AlphaMode::Opaque) return false;
-  if (colorTexture(primitive.material) || hasPartialVertexAlpha(primitive)) return true;
+  const Texture* texture = colorTexture(primitive.material);
+  if ((texture && !texture->opaque()) || hasPartialVertexAlpha(primitive)) return true;
   const float whole = applyAlphaMode(m, m.baseColor.w);
   return whole > 0.0f && whole < 1.0f;
 }

@@ -84,21 +84,33 @@ Expected<Texture> Texture::decode(const ImageSource& source, ColorSpace space) {
             space == ColorSpace::Srgb && c < 3 && !loaded->isFloat ? srgbToLinear(rgba[c]) : rgba[c];
     }
   }
+  texture.sortAlpha();
   return texture;
 }
 
-Vec4 Texture::fetch(int x, int y) const {
-  return fetch(4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)));
+void Texture::sortAlpha() {
+  alphaBlocks_.assign(blockOf(width_ - 1, height_ - 1) + 1, 0);
+  opaque_ = true;
+  for (int y = 0; y < height_; ++y)
+    for (int x = 0; x < width_; ++x) {
+      const float alpha = fetchAlpha(x, y);
+      opaque_ = opaque_ && alpha == 1.0f;
+      alphaBlocks_[blockOf(x, y)] |=
+          static_cast<std::uint8_t>((alpha != 1.0f ? kSomeTransparent : 0) | (alpha != 0.0f ? kSomeVisible : 0));
+    }
+  if (opaque_) alphaBlocks_ = {};
 }
 
-Vec4 Texture::fetch(std::size_t first) const {
+Vec4 Texture::fetch(int x, int y) const {
+  const std::size_t first = indexOf(x, y);
   if (bytes_.empty()) return {floats_[first], floats_[first + 1], floats_[first + 2], floats_[first + 3]};
   const Table& table = tableOf(space_);
-  return {table[bytes_[first]], table[bytes_[first + 1]], table[bytes_[first + 2]], fetchAlpha(first)};
+  return {table[bytes_[first]], table[bytes_[first + 1]], table[bytes_[first + 2]], fetchAlpha(x, y)};
 }
 
-float Texture::fetchAlpha(std::size_t first) const {
-  return bytes_.empty() ? floats_[first + 3] : static_cast<float>(bytes_[first + 3]) / 255.0f;
+float Texture::fetchAlpha(int x, int y) const {
+  const std::size_t alpha = indexOf(x, y) + 3;
+  return bytes_.empty() ? floats_[alpha] : static_cast<float>(bytes_[alpha]) / 255.0f;
 }
 
 Texture::Footprint Texture::footprint(const TextureRef& ref, Vec2 uv) const {
@@ -108,13 +120,8 @@ Texture::Footprint Texture::footprint(const TextureRef& ref, Vec2 uv) const {
   const float y = tameCoordinate(transformed.y) * static_cast<float>(height_) - offset;
   const std::int64_t left = floorOf(x), top = floorOf(y);
   const std::int64_t further = ref.nearest ? 0 : 1;
-  const int columns[2] = {wrapTexel(left, width_, ref.wrapU), wrapTexel(left + further, width_, ref.wrapU)};
-  const int rows[2] = {wrapTexel(top, height_, ref.wrapV), wrapTexel(top + further, height_, ref.wrapV)};
-  Footprint at;
-  for (int j = 0; j < 2; ++j)
-    for (int i = 0; i < 2; ++i)
-      at.first[j][i] = 4 * (static_cast<std::size_t>(rows[j]) * static_cast<std::size_t>(width_) +
-                            static_cast<std::size_t>(columns[i]));
+  Footprint at{{wrapTexel(left, width_, ref.wrapU), wrapTexel(left + further, width_, ref.wrapU)},
+               {wrapTexel(top, height_, ref.wrapV), wrapTexel(top + further, height_, ref.wrapV)}};
   if (ref.nearest) return at;
   at.fx = x - static_cast<float>(left);
   at.fy = y - static_cast<float>(top);
@@ -123,26 +130,35 @@ Texture::Footprint Texture::footprint(const TextureRef& ref, Vec2 uv) const {
 
 Vec4 Texture::sample(const TextureRef& ref, Vec2 uv) const {
   const Footprint at = footprint(ref, uv);
-  if (ref.nearest) return fetch(at.first[0][0]);
-  return glm::mix(glm::mix(fetch(at.first[0][0]), fetch(at.first[0][1]), at.fx),
-                  glm::mix(fetch(at.first[1][0]), fetch(at.first[1][1]), at.fx), at.fy);
+  if (ref.nearest) return fetch(at.columns[0], at.rows[0]);
+  const auto row = [&](int y) { return glm::mix(fetch(at.columns[0], y), fetch(at.columns[1], y), at.fx); };
+  return glm::mix(row(at.rows[0]), row(at.rows[1]), at.fy);
 }
 
 float Texture::sampleAlpha(const TextureRef& ref, Vec2 uv) const {
+  if (opaque_) return 1.0f;
   const Footprint at = footprint(ref, uv);
-  if (ref.nearest) return fetchAlpha(at.first[0][0]);
-  return glm::mix(glm::mix(fetchAlpha(at.first[0][0]), fetchAlpha(at.first[0][1]), at.fx),
-                  glm::mix(fetchAlpha(at.first[1][0]), fetchAlpha(at.first[1][1]), at.fx), at.fy);
+  if (!alphaBlocks_.empty()) {
+    int kinds = 0;
+    for (const int y : at.rows)
+      for (const int x : at.columns) kinds |= alphaBlocks_[blockOf(x, y)];
+    if (kinds == kSomeVisible) return 1.0f;
+    if (kinds == kSomeTransparent) return 0.0f;
+  }
+  if (ref.nearest) return fetchAlpha(at.columns[0], at.rows[0]);
+  const auto row = [&](int y) { return glm::mix(fetchAlpha(at.columns[0], y), fetchAlpha(at.columns[1], y), at.fx); };
+  return glm::mix(row(at.rows[0]), row(at.rows[1]), at.fy);
 }
 
 void Texture::prefetch(const TextureRef& ref, Vec2 uv) const {
   // Of the footprint's two rows, the left texels: the right ones mostly share their cache lines.
   const Footprint at = footprint(ref, uv);
-  for (const auto& row : at.first) {
+  for (const int y : at.rows) {
+    const std::size_t first = indexOf(at.columns[0], y);
     if (bytes_.empty())
-      __builtin_prefetch(&floats_[row[0]]);
+      __builtin_prefetch(&floats_[first]);
     else
-      __builtin_prefetch(&bytes_[row[0]]);
+      __builtin_prefetch(&bytes_[first]);
   }
 }
 

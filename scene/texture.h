@@ -20,7 +20,9 @@ class Texture {
 
   int width() const { return width_; }
   int height() const { return height_; }
-  std::size_t bytes() const { return bytes_.size() + floats_.size() * sizeof(float); }
+  std::size_t bytes() const { return bytes_.size() + floats_.size() * sizeof(float) + alphaBlocks_.size(); }
+  /// Whether alpha is 1 everywhere.
+  bool opaque() const { return opaque_; }
 
   /// Linear RGBA of texel (x, y), rows from the top; coordinates must be in range.
   Vec4 fetch(int x, int y) const;
@@ -35,21 +37,36 @@ class Texture {
   void prefetch(const TextureRef& ref, Vec2 uv) const;
 
  private:
-  /// What sample() reads: the first texel of each of four, and how far between them.
+  /// What sample() reads: four texels, and how far between them.
   struct Footprint {
-    std::size_t first[2][2];  // [row][column], into bytes_ or floats_
+    int columns[2];
+    int rows[2];
     float fx = 0.0f;
     float fy = 0.0f;
   };
+  /// What a block of kBlock x kBlock texels holds, as bits: so small a table stays in a processor's cache, and most of
+  /// what a cut-out is asked for lies in blocks of one kind.
+  enum AlphaKind : std::uint8_t { kSomeTransparent = 1, kSomeVisible = 2 };
+  static constexpr int kBlock = 8;
+
   Footprint footprint(const TextureRef& ref, Vec2 uv) const;
-  Vec4 fetch(std::size_t first) const;
-  float fetchAlpha(std::size_t first) const;
+  float fetchAlpha(int x, int y) const;
+  std::size_t indexOf(int x, int y) const {
+    return 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x));
+  }
+  std::size_t blockOf(int x, int y) const {
+    return static_cast<std::size_t>(y / kBlock) * static_cast<std::size_t>((width_ + kBlock - 1) / kBlock) +
+           static_cast<std::size_t>(x / kBlock);
+  }
+  void sortAlpha();
 
   int width_ = 0;
   int height_ = 0;
   ColorSpace space_ = ColorSpace::Linear;
   std::vector<std::uint8_t> bytes_;  // RGBA
   std::vector<float> floats_;        // RGBA, linear
+  bool opaque_ = false;
+  std::vector<std::uint8_t> alphaBlocks_;  // AlphaKind; empty: not known, or all opaque
 };
 
 /// A texture and its mip chain (Williams 1983), for lookups where a texel is small in the picture.
