@@ -91,13 +91,14 @@ void ShadowPacket::set(int lane, const Vec3& origin, const Vec3& dir, float leng
   any = true;
 }
 
-Expected<std::unique_ptr<RayScene>> RayScene::build(const Scene& scene, const Materials& materials) {
+Expected<std::unique_ptr<RayScene>> RayScene::build(const Scene& scene, const Materials& materials,
+                                                    std::size_t mostFlattened) {
   std::unique_ptr<RayScene> rays(new RayScene(scene, materials));
-  if (auto built = rays->buildGeometry(); !built) return built.error();
+  if (auto built = rays->buildGeometry(mostFlattened); !built) return built.error();
   return rays;
 }
 
-Expected<void> RayScene::buildGeometry() {
+Expected<void> RayScene::buildGeometry(std::size_t mostFlattened) {
   auto device = newEmbreeDevice();
   if (!device) return device.error();
   device_ = *std::move(device);
@@ -105,8 +106,13 @@ Expected<void> RayScene::buildGeometry() {
   meshScenes_.resize(scene_->meshes.size());
 
   std::vector<int> uses(scene_->meshes.size(), 0);
-  for (const Instance& instance : scene_->instances)
-    if (instance.settings.casts) ++uses[static_cast<std::size_t>(instance.mesh)];
+  std::size_t placedTriangles = 0;
+  for (const Instance& instance : scene_->instances) {
+    if (!instance.settings.casts) continue;
+    ++uses[static_cast<std::size_t>(instance.mesh)];
+    for (const Primitive& primitive : scene_->meshes[static_cast<std::size_t>(instance.mesh)].primitives)
+      placedTriangles += primitive.triangleCount();
+  }
 
   for (std::size_t i = 0; i < scene_->instances.size(); ++i) {
     const Instance& instance = scene_->instances[i];
@@ -115,7 +121,8 @@ Expected<void> RayScene::buildGeometry() {
     if (firstPart == parts_.size()) continue;
     // Embree inverts the transform of what it places itself; what is flat has no inverse.
     const bool invertible = std::isnormal(glm::determinant(Mat3(instance.worldFromObject)));
-    if (uses[static_cast<std::size_t>(instance.mesh)] == 1 || !invertible) {
+    const bool once = uses[static_cast<std::size_t>(instance.mesh)] == 1;
+    if (once || placedTriangles <= mostFlattened || !invertible) {
       for (std::uint32_t p = firstPart; p < parts_.size(); ++p) {
         auto geometry = triangles(*parts_[p].primitive, &instance.worldFromObject, &parts_[p].worldPositions);
         if (!geometry) return failure("ray tracing: out of memory for the triangles of '" + instance.name + "'");

@@ -29,7 +29,7 @@ TEST(EmissiveTriangles, DensityOfAHitIsThatOfTheSample) {
   test.addInstance(1, moved);
   std::vector<std::string> notes;
   const Materials materials(test.scene, true, notes);
-  auto rays = RayScene::build(test.scene, materials);
+  auto rays = RayScene::build(test.scene, materials, 0);
   ASSERT_TRUE(rays);
   const EmissiveTriangles lights(**rays, materials);
   EXPECT_EQ(lights.size(), 6u);

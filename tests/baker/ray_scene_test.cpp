@@ -19,8 +19,9 @@ struct Built {
   Materials materials;
   std::unique_ptr<RayScene> rays;
 
-  explicit Built(const Scene& scene) : materials(scene, true, notes) {
-    auto built = RayScene::build(scene, materials);
+  // As large scenes are: what is placed more than once becomes Embree instances.
+  explicit Built(const Scene& scene, std::size_t mostFlattened = 0) : materials(scene, true, notes) {
+    auto built = RayScene::build(scene, materials, mostFlattened);
     EXPECT_TRUE(built);
     rays = *std::move(built);
   }
@@ -407,6 +408,25 @@ TEST(CoherencePilot, NeverWithInstances) {
   CoherencePilot pilot(*built.rays);
   for (std::uint32_t i = 0; i < 8; ++i) pilot.see(RayPacket());
   EXPECT_EQ(pilot.mode(), TraceMode::Packet);
+}
+
+TEST(RayScene, FlattensTheInstancesOfSmallScenes) {
+  TestScene test;
+  test.addRectangle({-9, 1, -9}, {18, 0, 0}, {0, 0, 18});
+  test.addInstance(0, Mat4(Vec4(1, 0, 0, 0), Vec4(0, 1, 0, 0), Vec4(0, 0, 1, 0), Vec4(0, 1, 0, 1)));
+  EXPECT_TRUE(Built(test.scene, 3).rays->placesInstances());
+  const Built flat(test.scene, 4);  // two triangles each
+  EXPECT_FALSE(flat.rays->placesInstances());
+  RayPacket packet;
+  packet.set(0, {0, 3, 0}, {0, -1, 0});
+  packet.set(1, {0, 1.5f, 0}, {0, -1, 0});
+  flat.rays->intersect(packet, TraceMode::Packet);
+  ASSERT_TRUE(packet.hit(0) && packet.hit(1));
+  EXPECT_EQ(packet.rayhit.ray.tfar[0], 1.0f);
+  EXPECT_EQ(packet.rayhit.ray.tfar[1], 0.5f);
+  EXPECT_EQ(flat.rays->surfaceAt(packet, 0).p, Vec3(0, 2, 0));
+  EXPECT_EQ(flat.rays->parts()[flat.rays->partOf(packet, 0)].instance, 1);
+  EXPECT_EQ(flat.rays->parts()[flat.rays->partOf(packet, 1)].instance, 0);
 }
 
 }  // namespace

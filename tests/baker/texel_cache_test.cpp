@@ -21,7 +21,7 @@ struct Mapped {
   std::unique_ptr<TexelMap> map;
 
   explicit Mapped(const TestScene& test) : materials(test.scene, true, notes), texels(findTexels(test.atlas)) {
-    auto built = RayScene::build(test.scene, materials);
+    auto built = RayScene::build(test.scene, materials, 0);
     EXPECT_TRUE(built);
     rays = *std::move(built);
     map = std::make_unique<TexelMap>(*rays, test.atlas, texels);

@@ -129,7 +129,7 @@ TEST(Transport, OneBounceIsALamp) {
   }
 }
 
-TEST(Transport, InstancesBakeAsFlattenedGeometryDoes) {
+TEST(Transport, InstancesBakeAsCopiesDo) {
   const auto scene = [](bool instanced) {
     TestScene test;
     test.addRectangle({-2, 0, 2}, {4, 0, 0}, {0, 0, -4});
