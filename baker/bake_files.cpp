@@ -52,6 +52,7 @@ Expected<void> addPage(FileSet& set, const fs::path& dir, std::size_t page, cons
                        const BakeRecord& record, std::vector<ImageFile>& files) {
   WriteImageOptions options;
   options.format = record.half ? PixelFormat::Half : PixelFormat::Float;
+  options.noisy = !record.half;
   const auto add = [&](const std::string& kind, const Image& image) -> Expected<void> {
     options.metadata = pageMetadata(page, kind, record);
     auto file = set.add(dir / pageFileName(page, kind));
@@ -64,6 +65,7 @@ Expected<void> addPage(FileSet& set, const fs::path& dir, std::size_t page, cons
   if (auto added = add("flat", baked.flat); !added) return added;
   // Sample counts and coverage are exact in float only.
   options.format = PixelFormat::Float;
+  options.noisy = false;
   options.channelNames = {"coverage", "validity", "stderr", "samples"};
   return add("aux", baked.aux);
 }

@@ -257,7 +257,7 @@ Expected<ImageWriter> ImageWriter::open(const PendingFile& file, int width, int 
   if (!options.channelNames.empty()) spec.channelnames = options.channelNames;
   spec.attribute("oiio:UnassociatedAlpha", 1);
   const std::string_view format = state->output->format_name();
-  if (format == "openexr") spec.attribute("compression", "zip");
+  if (format == "openexr") spec.attribute("compression", options.noisy ? "rle" : "zip");
   // A fifteenth larger than zlib's own choice, 6, in a quarter of its time. Other formats may write it into their file.
   if (format == "png") spec.attribute("png:compressionLevel", 4);
   // OpenImageIO adds the time of day where there is none, and equal images would be unequal files.
