@@ -39,8 +39,25 @@ Polygon clipSide(const Polygon& in, int axis, double limit, double sign) {
   return out;
 }
 
+/// Whether the texel lies inside of the triangle as a whole: its centre on the inner side of each edge, by half of the
+/// square's extent across it.
+bool covers(const std::array<Vec2d, 3>& t, const Vec2d& centre) {
+  const double sign = cross(t[1] - t[0], t[2] - t[0]) < 0 ? -1 : 1;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vec2d edge = t[i < 2 ? i + 1 : 0] - t[i];
+    if (!(sign * cross(edge, centre - t[i]) >= 0.5 * (std::abs(edge.x) + std::abs(edge.y)))) return false;
+  }
+  return true;
+}
+
 Polygon clipToTexel(const std::array<Vec2d, 3>& triangle, TexelCoord texel) {
   Polygon polygon;
+  const double x = texel.x, y = texel.y;
+  if (covers(triangle, {x + 0.5, y + 0.5})) {
+    for (const Vec2d& corner : {Vec2d(x, y), Vec2d(x + 1, y), Vec2d(x + 1, y + 1), Vec2d(x, y + 1)})
+      polygon.add(corner);
+    return polygon;
+  }
   for (const Vec2d& p : triangle) polygon.add(p);
   const Vec2d least = glm::min(glm::min(triangle[0], triangle[1]), triangle[2]);
   const Vec2d most = glm::max(glm::max(triangle[0], triangle[1]), triangle[2]);

@@ -43,8 +43,8 @@ struct WriteImageOptions {
   PixelFormat format = PixelFormat::Float;      // U8 and U16 store clamp(value, 0, 1) rounded to nearest
   std::vector<std::string> channelNames;        // empty: the format's default (R, G, B, A)
   std::map<std::string, std::string> metadata;  // string attributes (EXR, TIFF; PNG as text)
-  /// EXR by run lengths instead of zip: of floats whose lower bits are noise zip makes files 5 to 9% smaller, in 13 times
-  /// the time.
+  /// EXR by run lengths instead of zip: of floats whose lower bits are noise zip makes files 5 to 9% smaller, in 13
+  /// times the time.
   bool noisy = false;
 };
 
