@@ -20,7 +20,7 @@ class Texture {
 
   int width() const { return width_; }
   int height() const { return height_; }
-  std::size_t bytes() const { return bytes_.size() + floats_.size() * sizeof(float) + alphaBlocks_.size(); }
+  std::size_t bytes() const { return bytes_.size() + floats_.size() * sizeof(float); }
   /// Whether alpha is 1 everywhere.
   bool opaque() const { return opaque_; }
 

@@ -58,6 +58,35 @@ TEST(Texture, BilinearMeetsTexelCentresAndMeansBetween) {
   EXPECT_FLOAT_EQ(t.sample(clamp, {5.0f, 0.25f}).x, 1.0f);
 }
 
+// Clear on the left, opaque on the right and a ramp between, in an image that is no whole number of blocks.
+TEST(Texture, AlphaAloneIsThatOfTheSample) {
+  Image image(45, 21, 4, 1.0f);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      image.at(x, y)[3] = x < 20 ? 0.0f : x < 23 ? 0.2f * static_cast<float>(x - 19) : y == 20 && x == 44 ? 0.0f : 1.0f;
+  const Texture t = decoded({"ramp", "image/png", *encodePng(image)}, ColorSpace::Srgb);
+  EXPECT_FALSE(t.opaque());
+  TextureRef ref;
+  for (const Wrap wrap : {Wrap::Repeat, Wrap::Mirror, Wrap::Clamp})
+    for (const bool nearest : {false, true}) {
+      ref.wrapU = ref.wrapV = wrap;
+      ref.nearest = nearest;
+      for (int i = 0; i < 300; ++i)
+        for (int k = 0; k < 40; ++k) {
+          const Vec2 uv(-0.5f + 0.0067f * static_cast<float>(i), -0.5f + 0.051f * static_cast<float>(k));
+          ASSERT_NEAR(t.sampleAlpha(ref, uv), t.sample(ref, uv).w, 1e-6f) << uv.x << ", " << uv.y;
+        }
+    }
+}
+
+TEST(Texture, KnowsWhetherItIsOpaque) {
+  Image image(9, 9, 4, 1.0f);
+  EXPECT_TRUE(decoded({"white", "", *encodePng(image)}, ColorSpace::Srgb).opaque());
+  EXPECT_TRUE(decoded({"grey", "", *encodePng(Image(9, 9, 1, 0.5f))}, ColorSpace::Srgb).opaque());
+  image.at(8, 8)[3] = 0.99f;
+  EXPECT_FALSE(decoded({"hole", "", *encodePng(image)}, ColorSpace::Srgb).opaque());
+}
+
 TEST(Texture, WrapModes) {
   const Texture t = decoded(checker(), ColorSpace::Linear);
   TextureRef ref;
