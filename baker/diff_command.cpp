@@ -165,8 +165,8 @@ Expected<void> checkCharts(const DiffArguments& a, const Json& first, const Json
                       "compared; bake one with --layout-from the other");
   if (!quiet)
     std::fprintf(stderr,
-                 "lumel: warning: only %zu of %zu charts lie in the same place in both: the rest of the figures and "
-                 "heat maps compares different surfaces\n",
+                 "lumel: warning: only %zu of %zu charts lie in the same place in both; texels of others may stand for "
+                 "different surfaces\n",
                  both.size(), most);
   return {};
 }

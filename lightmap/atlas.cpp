@@ -138,7 +138,8 @@ class AtlasBuilder {
     if (earlier && report.keptCharts == 0 && report.generatedCharts > 0)
       report.warnings.push_back(std::string("the earlier layout ") +
                                 (hadSome ? "has no room for what changed" : "holds no chart of this scene") +
-                                ": all charts are placed anew");
+                                ": all charts are placed anew" +
+                                (hadSome ? "; bakes with --texels-per-meter add a page instead" : ""));
     return {};
   }
 
