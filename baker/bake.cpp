@@ -59,6 +59,7 @@ struct WaveStats {
   std::uint64_t shadowRays = 0;
   std::size_t nonFinite = 0;
   std::vector<NonFiniteSample> firstNonFinite;
+  std::uint32_t mostSamples = 0;
   double luminance = 0.0;
   double standardError = 0.0;
   std::size_t validTexels = 0;
@@ -74,6 +75,7 @@ void storeAux(Image& aux, TexelCoord at, const BakedTexel& texel, const Vec3& fl
   pixel[1] = texel.validity;
   pixel[2] = texel.standardError;
   pixel[3] = static_cast<float>(texel.samples);
+  stats.mostSamples = std::max(stats.mostSamples, texel.samples);
   if (texel.validity < 0.5f) return;
   ++stats.validTexels;
   stats.luminance += static_cast<double>(luminance(flat));
@@ -104,12 +106,16 @@ void storeTexel(BakedPage& page, TexelCoord at, const TexelResult& texel, Projec
   storeAux(page.aux, at, baked, value.flat, rnm, stats);
 }
 
-BakeStats sumUp(std::span<const WaveStats> waves, std::uint64_t seed) {
+/// Fewest samples of which an error is known: of the gather two passes.
+std::uint32_t fewestForError(Integrator integrator) { return integrator == Integrator::Gather ? 16 : 2; }
+
+BakeStats sumUp(std::span<const WaveStats> waves, const BakeOptions& options) {
   BakeStats total;
   double luminanceSum = 0.0;
   double errorSum = 0.0;
   double residualSquares = 0.0;
   std::size_t valid = 0;
+  std::uint32_t mostSamples = 0;
   std::size_t residuals = 0;
   std::vector<std::string> notes;
   for (const WaveStats& wave : waves) {
@@ -119,18 +125,20 @@ BakeStats sumUp(std::span<const WaveStats> waves, std::uint64_t seed) {
     luminanceSum += wave.luminance;
     errorSum += wave.standardError;
     valid += wave.validTexels;
+    mostSamples = std::max(mostSamples, wave.mostSamples);
     residualSquares += wave.residualSquares;
     residuals += wave.residuals;
     for (const NonFiniteSample& s : wave.firstNonFinite)
       if (notes.size() < kMostNotes)
         notes.push_back("non-finite sample left out: page " + std::to_string(s.page) + ", texel (" +
                         std::to_string(s.texel.x) + ", " + std::to_string(s.texel.y) + "), sample " +
-                        std::to_string(s.sample) + ", seed " + std::to_string(seed));
+                        std::to_string(s.sample) + ", seed " + std::to_string(options.seed));
   }
   total.notes = std::move(notes);
   if (valid > 0) {
     total.meanFlat = luminanceSum / static_cast<double>(valid);
-    total.meanStandardError = errorSum / static_cast<double>(valid);
+    if (mostSamples >= fewestForError(options.integrator))
+      total.meanStandardError = errorSum / static_cast<double>(valid);
   }
   if (residuals > 0 && total.meanFlat > 0)
     total.projectionResidual = std::sqrt(residualSquares / static_cast<double>(residuals)) / total.meanFlat;
@@ -319,7 +327,7 @@ Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vec
                              : tracePaths(transport, kernels, atlas, texels, options, result.pages, progress);
   if (!waveStats) return waveStats.error();
 
-  result.stats = sumUp(*waveStats, options.seed);
+  result.stats = sumUp(*waveStats, options);
   for (const PageTexels& page : texels) result.stats.texels += page.size();
   result.stats.notes.insert(result.stats.notes.begin(), notes.begin(), notes.end());
   result.stats.seconds = sinceStart.seconds();

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -60,11 +61,11 @@ struct BakeStats {
   std::uint64_t rays = 0;        // closest-hit
   std::uint64_t shadowRays = 0;  // occlusion
   double seconds = 0.0;
-  std::size_t nonFiniteSamples = 0;  // counted and left out of the sums, named in `notes`; never silently zeroed
-  double meanFlat = 0.0;             // mean luminance over covered, valid texels
-  double meanStandardError = 0.0;    // mean of aux stderr over the same
-  double projectionResidual = 0.0;   // RMS difference between decoded and true irradiance / pi over sample normals
-                                     // within 30 degrees, relative to meanFlat
+  std::size_t nonFiniteSamples = 0;         // counted and left out of the sums, named in `notes`; never silently zeroed
+  double meanFlat = 0.0;                    // mean luminance over covered, valid texels
+  std::optional<double> meanStandardError;  // mean of aux stderr over the same; none of too few samples
+  double projectionResidual = 0.0;  // RMS difference between decoded and true irradiance / pi over sample normals
+                                    // within 30 degrees, relative to meanFlat
   std::vector<std::string> notes;
 };
 

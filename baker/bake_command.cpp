@@ -127,7 +127,6 @@ void printSummary(const fs::path& output, const AtlasResult& atlas, const BakeRe
   double seconds = 0.0;
   for (const StageTime& stage : record.stages) seconds += stage.seconds;
   const BakeStats& stats = result.stats;
-  const double relative = stats.meanFlat > 0.0 ? 100.0 * stats.meanStandardError / stats.meanFlat : 0.0;
   const double rays = static_cast<double>(stats.rays + stats.shadowRays);
   std::fprintf(stderr, "%s: %zu page%s, %.1f%% covered, %zu chart%s, %llu texels", output.c_str(),
                atlas.atlas.pages.size(), atlas.atlas.pages.size() == 1 ? "" : "s",
@@ -135,8 +134,12 @@ void printSummary(const fs::path& output, const AtlasResult& atlas, const BakeRe
                atlas.atlas.charts.size() == 1 ? "" : "s", static_cast<unsigned long long>(stats.texels));
   if (atlas.atlas.texelsPerMeter > 0.0f)
     std::fprintf(stderr, " at %.4g per metre", static_cast<double>(atlas.atlas.texelsPerMeter));
-  std::fprintf(stderr, "\nmean light %.4g, standard error %.2g%%, projection residual %.2g%%\n", stats.meanFlat,
-               relative, 100.0 * stats.projectionResidual);
+  std::fprintf(stderr, "\nmean light %.4g, ", stats.meanFlat);
+  if (stats.meanFlat > 0.0 && stats.meanStandardError)
+    std::fprintf(stderr, "standard error %.2g%%", 100.0 * *stats.meanStandardError / stats.meanFlat);
+  else
+    std::fputs("standard error not known", stderr);
+  std::fprintf(stderr, ", projection residual %.2g%%\n", 100.0 * stats.projectionResidual);
   std::fprintf(stderr, "%.1f s, %.1f million rays (%.1f million per second of bake), %.0f MiB at the peak\n", seconds,
                rays / 1e6, stats.seconds > 0 ? rays / 1e6 / stats.seconds : 0.0,
                static_cast<double>(record.peakMemoryBytes) / (1024.0 * 1024.0));

@@ -123,8 +123,9 @@ Json describeScene(const Scene& scene, const BakeRecord& record) {
 }
 
 Json describeError(const BakeStats& stats) {
+  const Json error = stats.meanStandardError ? Json(*stats.meanStandardError) : Json(nullptr);
   return {{"meanFlat", stats.meanFlat},
-          {"meanStandardError", stats.meanStandardError},
+          {"meanStandardError", error},
           {"projectionResidual", stats.projectionResidual},
           {"nonFiniteSamples", stats.nonFiniteSamples}};
 }

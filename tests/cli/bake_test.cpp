@@ -236,6 +236,18 @@ TEST(Render, NormalMapDecodesTheThreeMaps) {
   EXPECT_NEAR(readPixels(dir / "still.exr").rgb(4, 4).x, expected / weights, 0.01f * expected / weights);
 }
 
+TEST(Bake, ErrorOfTooFewSamplesIsNotZero) {
+  const auto dir = scratch();
+  writeFile(dir / "floor.gltf", gltfOf({floorQuad()}).dump());
+  for (const char* samples : {"8", "16"}) {
+    const Outcome outcome = run({"bake", dir / "floor.gltf", "-o", dir / "out", "--page-size", "16", "--samples",
+                                 samples, "--sky-color", "1", "1", "1"});
+    const bool known = samples == std::string("16");
+    EXPECT_EQ(outcome.err.find("not known") == std::string::npos, known) << outcome.err;
+    EXPECT_EQ(readJson(dir / "out" / "bake.json")["error"]["meanStandardError"].is_number(), known);
+  }
+}
+
 TEST(Diff, FiguresOfTwoBakes) {
   const auto dir = scratch();
   nlohmann::json gltf = gltfOf({floorQuad()});
