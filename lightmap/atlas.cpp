@@ -91,6 +91,20 @@ class AtlasBuilder {
     return area > 0 ? std::sqrt(sum / area) : 0.0;
   }
 
+  /// Charts of a density that is far too high would take minutes to be found too large for a page. Twice a page's
+  /// diagonal is more than any chart may squeeze a triangle by.
+  Expected<void> checkDensity(double density) const {
+    for (const int i : generated_) {
+      const Instance& instance = scene_.instances[static_cast<std::size_t>(i)];
+      const double texels = density * weightedLength(scene_, instance);
+      if (texels > 3.0 * options_.pageSize)
+        return usageError("'" + instance.name + "' has a triangle that is " + std::to_string(std::llround(texels)) +
+                          " texels long, a page has " + std::to_string(options_.pageSize) +
+                          "; take a larger --page-size or a lower density");
+    }
+    return {};
+  }
+
   Expected<void> generateCharts() {
     if (generated_.empty()) return {};
     double area = 0;
@@ -101,6 +115,9 @@ class AtlasBuilder {
                            : search ? guessDensity(area, options_.pageSize)
                                     : static_cast<double>(options_.texelsPerMeter);
     if (!(area > 0) || !std::isfinite(density)) return {};  // nothing has a surface
+
+    if (!search)
+      if (auto fits = checkDensity(density); !fits) return fits;
 
     const Stopwatch chartTime;
     UnwrapOptions unwrapOptions;

@@ -53,6 +53,17 @@ Vec3 unitOr(const Vec3& v, const Vec3& otherwise) {
   return length > 0 && std::isfinite(length) ? Vec3(d / length) : otherwise;
 }
 
+/// Calls body(a, b, c) with the corners, turned and scaled as in the world, of the triangles that get a lightmap.
+template <class Body>
+void forEachReceiving(const Scene& scene, const Instance& instance, Body body) {
+  const Mat3d linear(Mat3(instance.worldFromObject));
+  for (const Primitive& primitive : scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives) {
+    if (!receivesLight(scene, instance, primitive)) continue;
+    const auto corner = [&](std::size_t i) { return linear * Vec3d(primitive.positions[primitive.indices[i]]); };
+    for (std::size_t i = 0; i < primitive.indices.size(); i += 3) body(corner(i), corner(i + 1), corner(i + 2));
+  }
+}
+
 }  // namespace
 
 TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texelsPerMeter, TriangleSources& source) {
@@ -82,19 +93,19 @@ TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texel
 }
 
 double weightedArea(const Scene& scene, const Instance& instance) {
-  const Mat3d linear(Mat3(instance.worldFromObject));
   double sum = 0;
-  for (const Primitive& primitive : scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives) {
-    if (!receivesLight(scene, instance, primitive)) continue;
-    for (std::size_t t = 0; t < primitive.triangleCount(); ++t) {
-      const Vec3d a = linear * Vec3d(primitive.positions[primitive.indices[3 * t]]);
-      const Vec3d b = linear * Vec3d(primitive.positions[primitive.indices[3 * t + 1]]);
-      const Vec3d c = linear * Vec3d(primitive.positions[primitive.indices[3 * t + 2]]);
-      sum += triangleArea(a, b, c);
-    }
-  }
+  forEachReceiving(scene, instance,
+                   [&sum](const Vec3d& a, const Vec3d& b, const Vec3d& c) { sum += triangleArea(a, b, c); });
   const double scale = instance.settings.texelDensityScale;
   return sum * scale * scale;
+}
+
+double weightedLength(const Scene& scene, const Instance& instance) {
+  double squared = 0;
+  forEachReceiving(scene, instance, [&squared](const Vec3d& a, const Vec3d& b, const Vec3d& c) {
+    for (const Vec3d& edge : {b - a, c - b, a - c}) squared = std::max(squared, glm::dot(edge, edge));
+  });
+  return std::sqrt(squared) * static_cast<double>(instance.settings.texelDensityScale);
 }
 
 ObjectLayouts layOutObjects(const Scene& scene, const std::vector<int>& instances, double texelsPerMeter,

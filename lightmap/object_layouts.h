@@ -58,6 +58,9 @@ TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texel
 /// Surface of the instance in square metres, times the square of its density scale: what it asks of the atlas.
 double weightedArea(const Scene& scene, const Instance& instance);
 
+/// Length of its longest edge that gets a lightmap in metres, times its density scale.
+double weightedLength(const Scene& scene, const Instance& instance);
+
 /// Parallel over layouts. A cancelled run returns early with what it has: ask progress.cancelled().
 ObjectLayouts layOutObjects(const Scene& scene, const std::vector<int>& instances, double texelsPerMeter,
                             const UnwrapOptions& options, Progress& progress);

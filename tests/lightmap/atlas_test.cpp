@@ -117,12 +117,19 @@ TEST(Density, ATriangleLargerThanAPageIsAUsageError) {
   s.positions = {{0, 0, 0}, {100, 0, 0}, {0, 100, 0}};
   s.indices = {0, 1, 2};
   AtlasOptions options;
-  options.texelsPerMeter = 20;
   options.pageSize = 256;
   Progress progress;
-  const Expected<AtlasResult> result = buildAtlas(s.scene(), options, progress);
-  ASSERT_FALSE(result);
-  EXPECT_EQ(result.error().kind, ErrorKind::Usage);
+  // Of a density far too high at once: its chart would have 10^16 texels.
+  for (const float density : {4.0f, 20.0f, 1e6f}) {
+    options.texelsPerMeter = density;
+    const Expected<AtlasResult> result = buildAtlas(s.scene(), options, progress);
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().kind, ErrorKind::Usage);
+  }
+  // A sliver whose area would fill the page at such a density is no mistake where the density is looked for.
+  s.positions[2] = {0, 1e-4f, 0};
+  options.texelsPerMeter = 0;
+  EXPECT_TRUE(buildAtlas(s.scene(), options, progress));
 }
 
 TEST(Atlas, OfAnEmptySceneIsEmpty) {
