@@ -64,8 +64,7 @@ void forEachReceiving(const Scene& scene, const Instance& instance, Body body) {
   }
 }
 
-}  // namespace
-
+/// The instance's triangles that get a lightmap, in texels, counter-clockwise from the front in the world.
 TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texelsPerMeter, TriangleSources& source) {
   TriangleSoup soup;
   soup.points.toTexels = Mat3d(Mat3(instance.worldFromObject)) * densityOf(instance, texelsPerMeter);
@@ -91,6 +90,8 @@ TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texel
   }
   return soup;
 }
+
+}  // namespace
 
 double weightedArea(const Scene& scene, const Instance& instance) {
   double sum = 0;

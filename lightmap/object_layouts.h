@@ -52,9 +52,6 @@ struct ObjectLayouts {
   std::vector<LayoutUse> uses;  // in the order of the instances given
 };
 
-/// The instance's triangles that get a lightmap, in texels, counter-clockwise from the front in the world.
-TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texelsPerMeter, TriangleSources& source);
-
 /// Surface of the instance in square metres, times the square of its density scale: what it asks of the atlas.
 double weightedArea(const Scene& scene, const Instance& instance);
 

@@ -38,8 +38,8 @@ void gather(std::vector<T>& values, std::span<const std::uint32_t> source) {
   values = std::move(gathered);
 }
 
-}  // namespace
-
+/// Drops triangles with a repeated index, or whose area is nothing beside the square of their longest edge (a
+/// relative criterion: a tiny triangle stays). Positions must be finite. Returns how many went.
 std::size_t dropDegenerateTriangles(Primitive& primitive) {
   std::size_t kept = 0;
   const std::size_t count = primitive.triangleCount();
@@ -52,6 +52,8 @@ std::size_t dropDegenerateTriangles(Primitive& primitive) {
   return count - kept;
 }
 
+/// Flat normals as glTF 2.0 asks for where a mesh has none: each triangle gets its own, vertices are split where
+/// their triangles differ. Needs a primitive without degenerate triangles; drops any tangents.
 void makeFlatNormals(Primitive& primitive) {
   VertexSplitter<Vec3> splitter(primitive.positions.size(), primitive.indices.size());
   for (std::size_t t = 0; t < primitive.triangleCount(); ++t) {
@@ -67,6 +69,8 @@ void makeFlatNormals(Primitive& primitive) {
   primitive.normals = splitter.takeValues();
 }
 
+/// Makes normals unit length; those that are zero or not finite become the area-weighted mean of their triangles'.
+/// Returns how many were replaced.
 std::size_t repairNormals(Primitive& primitive) {
   std::vector<std::uint32_t> bad;
   for (std::size_t v = 0; v < primitive.normals.size(); ++v) {
@@ -88,6 +92,7 @@ std::size_t repairNormals(Primitive& primitive) {
   return bad.size();
 }
 
+/// The same for tangents: unit xyz, w = +-1; a useless one becomes any direction perpendicular to the normal.
 std::size_t repairTangents(Primitive& primitive) {
   std::size_t bad = 0;
   for (std::size_t v = 0; v < primitive.tangents.size(); ++v) {
@@ -100,6 +105,8 @@ std::size_t repairTangents(Primitive& primitive) {
   }
   return bad;
 }
+
+}  // namespace
 
 void gatherVertices(Primitive& primitive, std::span<const std::uint32_t> source) {
   gather(primitive.positions, source);
