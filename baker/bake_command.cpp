@@ -100,10 +100,14 @@ void declareOptions(OptionTable& options, BakeArguments& a) {
 }
 
 /// What the options cannot check one by one.
-Expected<void> check(const BakeArguments& a) {
+Expected<void> check(const BakeArguments& a, const OptionTable& options) {
   if (auto checked = checkAtlas(a.atlas); !checked) return checked;
   if (a.bake.integrator == Integrator::Path && (a.bake.targetError > 0.0f || a.bake.timeBudgetSeconds > 0.0f))
     return usageError("--target-error and --time-budget work with --integrator gather alone; give --samples");
+  if (options.isGiven("max-samples") && !(a.bake.targetError > 0.0f))
+    return usageError("--max-samples goes with --target-error; without one --samples is the number");
+  if (a.bake.indirectOnly && a.bake.bounces == 0)
+    return usageError("--indirect-only and --bounces 0 leave no light; give one of them");
   if (a.bake.targetError > 0.0f && a.samples > a.bake.maxSamples)
     return usageError("--samples " + std::to_string(a.samples) + " is more than --max-samples " +
                       std::to_string(a.bake.maxSamples));
@@ -188,7 +192,7 @@ Expected<AtlasResult> makeAtlas(const Scene& scene, const BakeArguments& a, Comm
 }
 
 Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
-  if (auto checked = check(a); !checked) return checked;
+  if (auto checked = check(a, context.options); !checked) return checked;
   for (const fs::path& input : {a.scene, a.sky})
     if (isBakeFile(input.filename().string()))
       if (auto apart = checkNoInput(a.output / input.filename(), std::array{input}); !apart) return apart;

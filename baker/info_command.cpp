@@ -18,6 +18,9 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+/// The heading of options that say nothing of bakes and images.
+constexpr const char* kSceneOptions = "Scene";
+
 struct InfoArguments : SceneArguments {  // `scene`: a scene, an image or a bake
   bool json = false;
   EstimateOptions estimate;
@@ -94,6 +97,14 @@ Expected<Json> describeBakeFolder(const fs::path& dir) {
   return out;
 }
 
+Expected<void> check(const InfoArguments& a, const OptionTable& options) {
+  if (!isSceneFile(a.scene))
+    for (const Option& option : options.all())
+      if (option.group == kSceneOptions && option.isGiven)
+        return usageError("--" + option.name + " is for scenes, and " + a.scene.string() + " is none");
+  return checkSky(a);
+}
+
 Expected<Json> describe(const InfoArguments& a) {
   std::error_code ec;
   if (fs::is_directory(a.scene, ec)) return describeBakeFolder(a.scene);
@@ -135,7 +146,7 @@ Command infoCommand() {
   command.options.positionalPath("file", a.scene, "Scene (.gltf, .glb, .obj), folder of a bake, or image").placeholder =
       "FILE|DIR";
   command.options.flag("json", a.json, "Print JSON");
-  command.options.group("Scene");
+  command.options.group(kSceneOptions);
   command.options.number("texels-per-meter", a.estimate.texelsPerMeter, {0.0f, 1e6f},
                          "Density for the estimate; 0: the density that fills one page");
   command.options.integer("page-size", a.estimate.pageSize, {4, 16384}, "Texels on a side of a page, for the estimate");
@@ -149,7 +160,7 @@ Command infoCommand() {
   declareSky(command.options, a);
   declareOutsidePaths(command.options, a);
   command.run = [arguments](CommandContext& context) -> Expected<void> {
-    if (auto checked = checkSky(*arguments); !checked) return checked;
+    if (auto checked = check(*arguments, context.options); !checked) return checked;
     const auto json = describe(*arguments);
     if (!json) return json.error();
     if (arguments->json)

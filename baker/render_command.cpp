@@ -175,9 +175,13 @@ Expected<void> runRender(const RenderArguments& a, CommandContext& context) {
   const bool light = a.mode == RenderMode::Lit || a.mode == RenderMode::Lightmap;
   const float exposure = a.exposure ? *a.exposure : light ? autoExposure(still->radiance, still->lit) : 0.0f;
   if (auto written = writeStill(a, *still, describe(*camera), exposure); !written) return written;
-  if (!context.quiet)
-    std::fprintf(stderr, "%s: %d x %d, camera %s, exposure %.2f EV\n", a.output.c_str(), options.width, options.height,
-                 describe(*camera).c_str(), static_cast<double>(exposure));
+  if (context.quiet) return {};
+  std::fprintf(stderr, "%s: %d x %d, camera %s", a.output.c_str(), options.width, options.height,
+               describe(*camera).c_str());
+  if (lowerCaseExtension(a.output) == ".exr")
+    std::fputs(", unexposed\n", stderr);
+  else
+    std::fprintf(stderr, ", exposure %.2f EV\n", static_cast<double>(exposure));
   return {};
 }
 

@@ -76,6 +76,9 @@ TEST(ExitCodes, WrongCommandLineIs2) {
   EXPECT_TRUE(fails(bake({"--config", std::filesystem::temp_directory_path()}), 2, {"--config", "folder"}));
   EXPECT_TRUE(fails(bake({"--target-error", "0.1", "--samples", "99", "--max-samples", "64"}), 2,
                     {"--samples 99", "--max-samples 64"}));
+  EXPECT_TRUE(fails(bake({"--max-samples", "64"}), 2, {"--max-samples", "--target-error"}));
+  EXPECT_TRUE(fails(bake({"--indirect-only", "--bounces", "0"}), 2, {"--indirect-only", "--bounces 0"}));
+  EXPECT_TRUE(fails(run({"info", "flat.exr", "--lint"}), 2, {"--lint", "flat.exr is none"}));
   EXPECT_TRUE(fails(bake({"--sky", "x.hdr", "--sky-color", "1", "1", "1"}), 2, {"--sky-color"}));
   EXPECT_TRUE(fails(run({"render", out, "-o", "still.bmp"}), 2, {"still.bmp", ".png"}));
   EXPECT_FALSE(std::filesystem::exists(out));
