@@ -93,8 +93,9 @@ Expected<Scene> loadLitScene(const SceneArguments& a, const Progress& progress) 
 }
 
 bool hasLight(const Scene& scene) {
-  const auto emits = [](const Material& m) { return m.emission != Vec3(0.0f); };
-  return !scene.environment.isBlack() || !scene.lights.empty() ||
+  const auto emits = [](const Material& m) { return m.emission != Vec3(0.0f) && !m.unlit; };
+  const auto shines = [](const Light& l) { return l.intensity > 0.0f && l.color != Vec3(0.0f); };
+  return !scene.environment.isBlack() || std::any_of(scene.lights.begin(), scene.lights.end(), shines) ||
          std::any_of(scene.materials.begin(), scene.materials.end(), emits);
 }
 

@@ -228,6 +228,15 @@ TEST(Info, DescribesScenesImagesAndBakes) {
   // Without it a warning says that nothing shines.
   EXPECT_EQ(json["warnings"].size(), 1u);
   EXPECT_EQ(lit["warnings"].size(), 0u);
+  nlohmann::json off = gltfOf({floorQuad()});
+  off["materials"][0]["emissiveFactor"] = {1.0, 1.0, 1.0};
+  off["materials"][0]["extensions"]["KHR_materials_unlit"] = nlohmann::json::object();
+  off["extensionsUsed"] = {"KHR_materials_unlit", "KHR_lights_punctual"};
+  off["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "point"}, {"intensity", 0.0}}};
+  off["nodes"][0]["extensions"]["KHR_lights_punctual"]["light"] = 0;
+  writeFile(dir / "off.gltf", off.dump());
+  EXPECT_EQ(nlohmann::json::parse(run({"info", dir / "off.gltf", "--json"}).out, nullptr, false)["warnings"].size(),
+            1u);
   // What cannot be seen gets no lightmap.
   nlohmann::json glass = gltfOf({floorQuad()});
   glass["materials"][0]["alphaMode"] = "BLEND";
