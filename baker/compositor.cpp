@@ -389,7 +389,8 @@ Sighting Compositor::look(const Vec3& origin, const Vec3& direction) const {
   const RTCRayHit first = impl_->trace(origin, direction, 0.0f, true);
   if (first.hit.geomID == RTC_INVALID_GEOMETRY_ID) return sighting;
   const Hit hit = impl_->hitAt(first.hit.geomID, first.hit.primID, first.hit.u, first.hit.v);
-  sighting.throughBack = !hit.shape->material->doubleSided && impl_->showsBack(hit, direction);
+  sighting.behind = impl_->showsBack(hit, direction);
+  sighting.throughBack = sighting.behind && !hit.shape->material->doubleSided;
   return sighting;
 }
 

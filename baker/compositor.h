@@ -34,7 +34,8 @@ struct Still {
 /// What one ray sees, for choosing a viewpoint.
 struct Sighting {
   bool surface = false;      // else sky
-  bool throughBack = false;  // the first thing in the way was the culled back of a surface
+  bool behind = false;       // the first thing in the way was the back of a surface
+  bool throughBack = false;  // and culled
   float distance = 0.0f;
   Vec3 normal{0, 0, 0};  // geometric, unit, towards the eye
   int primitive = -1;    // number in the scene's file order

@@ -59,7 +59,7 @@ class Chooser {
       const Vec3 share(radicalInverse(i, 2), radicalInverse(i, 3), radicalInverse(i, 5));
       const Vec3 start = least_ + share * (most_ - least_);
       const Sighting floor = compositor_.look(start, Vec3(0, -1, 0));
-      if (!floor.surface || floor.throughBack) continue;
+      if (!floor.surface || floor.behind) continue;  // tools make all double-sided: from behind it is inside of a thing
       const Sighting ceiling = compositor_.look(start, Vec3(0, 1, 0));
       if (ceiling.throughBack) continue;
       const Vec3 ground = start - Vec3(0, floor.distance, 0);

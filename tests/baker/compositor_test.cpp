@@ -62,8 +62,9 @@ Vec2 inPicture(const Camera& camera, const Vec3& point, float aspect) {
   return Vec2(p.x / aspect, p.y) / (-p.z * std::tan(0.5f * camera.yFov));
 }
 
-TEST(Viewpoint, ShowsAThingInTheOpenWhole) {
+void expectThingShownWhole(bool doubleSided) {
   TestScene test;
+  test.scene.materials[0].doubleSided = doubleSided;
   const Vec3 least(10, 2, -3), most(13, 3, -1);
   // A box whose fronts face outwards: the room turned inside out.
   test.addRectangle({least.x, least.y, most.z}, {3, 0, 0}, {0, 1, 0}, {.texels = 0});
@@ -86,8 +87,14 @@ TEST(Viewpoint, ShowsAThingInTheOpenWhole) {
   }
 }
 
+TEST(Viewpoint, ShowsAThingInTheOpenWhole) {
+  expectThingShownWhole(false);
+  expectThingShownWhole(true);
+}
+
 TEST(Viewpoint, StaysInsideAClosedRoom) {
   TestScene test;
+  test.scene.materials[0].doubleSided = true;
   test.addRoom({0, 0, 0}, {6, 3, 4}, {.texels = 0});
   const BakedScene baked = litEvenly(std::move(test));
   const Vec3 eye(chooseViewpoint(compositorOf(baked), 1.7f).worldFromCamera[3]);
