@@ -202,14 +202,19 @@ TrianglePoint GatherWave::sourceOf(const PlaceOnTriangle& place) const {
   return at;
 }
 
-/// Of the points drawn, by area and where the surface is opaque.
-Vec3 GatherWave::meanReflectance(std::size_t lane) const {
-  const Materials& materials = scene_.transport.materials;
-  std::array<TrianglePoint, kWarmLights> points;
+/// The points drawn of a texel; asks memory for what meanReflectance reads of them.
+GatherWave::WarmPoints GatherWave::warmPoints(std::size_t lane) const {
+  WarmPoints points;
   for (std::uint32_t i = 0; i < kWarmLights; ++i) {
     points[i] = sourceOf(points_.place(lane, i));
-    materials.prefetchAlbedo(points[i]);
+    scene_.transport.materials.prefetchAlbedo(points[i]);
   }
+  return points;
+}
+
+/// By area and where the surface is opaque.
+Vec3 GatherWave::meanReflectance(const WarmPoints& points) const {
+  const Materials& materials = scene_.transport.materials;
   Vec3 sum(0.0f);
   float opacities = 0.0f;
   for (const TrianglePoint& at : points) {
@@ -247,8 +252,12 @@ Flight GatherWave::flightOf(std::size_t lane, std::uint32_t sample, const PointL
 std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, GatheredWave& counts) {
   std::array<WarmTexel, kLanes> texels;
   points_.draw(samplers_, kFootprint, 0, kWarmLights);
-  for (std::size_t lane = 0; lane < count_; ++lane)
-    if (covered_[lane]) texels[lane].reflectance = meanReflectance(lane);
+  // While one texel's memory is on its way, the one before is read.
+  std::array<WarmPoints, 2> points;
+  for (std::size_t lane = 0; lane <= count_; ++lane) {
+    if (lane < count_ && covered_[lane]) points[lane % 2] = warmPoints(lane);
+    if (lane > 0 && covered_[lane - 1]) texels[lane - 1].reflectance = meanReflectance(points[(lane - 1) % 2]);
+  }
   warmDirect(texels, counts);
 
   WarmSink sink{texels, links};

@@ -131,7 +131,9 @@ class GatherWave {
                       std::span<const std::uint8_t> buried, std::span<LightSpread> spreads);
 
  private:
-  Vec3 meanReflectance(std::size_t lane) const;
+  using WarmPoints = std::array<TrianglePoint, kWarmLights>;
+  WarmPoints warmPoints(std::size_t lane) const;
+  Vec3 meanReflectance(const WarmPoints& points) const;
   TrianglePoint sourceOf(const PlaceOnTriangle& place) const;
   void warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts);
   Flight flightOf(std::size_t lane, std::uint32_t sample, const PointLanes& from, const AimedRays& rays) const;

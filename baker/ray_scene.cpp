@@ -263,14 +263,15 @@ float RayScene::translationOf(int instance) const {
   return byEmbree ? maxAbs(Vec3(placed.worldFromObject[3])) : 0.0f;
 }
 
+/// Of a vertex, in world space.
+static Vec3 corner(const ScenePart& part, std::uint32_t vertex) {
+  return part.worldPositions ? part.worldPositions[vertex]
+                             : Vec3(part.worldFromObject * Vec4(part.primitive->positions[vertex], 1.0f));
+}
+
 std::array<Vec3, 3> RayScene::corners(const ScenePart& part, std::uint32_t triangle) const {
-  const std::uint32_t* corner = part.primitive->indices.data() + std::size_t{3} * triangle;
-  if (part.worldPositions)
-    return {part.worldPositions[corner[0]], part.worldPositions[corner[1]], part.worldPositions[corner[2]]};
-  std::array<Vec3, 3> world;
-  for (std::size_t i = 0; i < 3; ++i)
-    world[i] = Vec3(part.worldFromObject * Vec4(part.primitive->positions[corner[i]], 1.0f));
-  return world;
+  const std::uint32_t* index = part.primitive->indices.data() + std::size_t{3} * triangle;
+  return {corner(part, index[0]), corner(part, index[1]), corner(part, index[2])};
 }
 
 void RayScene::prefetchCorners(const RayPacket& rays, int lane) const {
@@ -286,10 +287,12 @@ void RayScene::prefetchCorners(const RayPacket& rays, int lane) const {
 void RayScene::cornersAt(const RayPacket& rays, int lane, HitCorners& hit) const {
   hit.part = partOf(rays, lane);
   const ScenePart& part = parts_[hit.part];
-  hit.corners = corners(part, rays.rayhit.hit.primID[lane]);
   const std::vector<Vec3>& normals = part.primitive->normals;
   const std::uint32_t* index = indicesAt(rays, lane);
-  for (std::size_t i = 0; i < 3; ++i) hit.normals[i] = normals.empty() ? Vec3(0.0f) : normals[index[i]];
+  for (std::size_t i = 0; i < 3; ++i) {
+    hit.corners[i] = corner(part, index[i]);
+    hit.normals[i] = normals.empty() ? Vec3(0.0f) : normals[index[i]];
+  }
   hit.weights = {rays.rayhit.hit.u[lane], rays.rayhit.hit.v[lane]};
   hit.dir = rays.direction(lane);
 }

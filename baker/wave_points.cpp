@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "scene/check.h"
@@ -24,12 +25,29 @@ WavePoints::WavePoints(const RayScene& rays, const Atlas& atlas, const PageTexel
     turns_[lane] = turns(lane);
     turning_ = turning_ || turns_[lane];
   }
-  for (std::size_t i = 0; i < (turning_ ? kMost : 1); ++i)
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      if (!active_[lane] || turns_[lane]) continue;
-      surfaces_[i].frame.set(lane, sources_[firstSource_[lane]].frame);
-      surfaces_[i].ng.set(lane, sources_[firstSource_[lane]].ng);
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    if (!active_[lane]) {
+      drawn_[lane] = {};
+      leaveOut(lane);
+    } else if (!turns_[lane]) {
+      setFrame(lane, sources_[firstSource_[lane]].frame, sources_[firstSource_[lane]].ng);
     }
+}
+
+/// Of all points of a texel.
+void WavePoints::setFrame(std::size_t lane, const Frame& frame, const Vec3& ng) {
+  if (!turning_) {
+    surfaces_[0].frame.set(lane, frame);
+    surfaces_[0].ng.set(lane, ng);
+    return;
+  }
+  const auto fill = [](float(&rows)[3][kMost], const Vec3& v) {
+    for (int k = 0; k < 3; ++k) std::fill(std::begin(rows[k]), std::end(rows[k]), v[k]);
+  };
+  fill(drawn_[lane].t, frame.t);
+  fill(drawn_[lane].b, frame.b);
+  fill(drawn_[lane].n, frame.n);
+  fill(drawn_[lane].ng, ng);
 }
 
 WavePoints::Source WavePoints::sourceOf(const RayScene& rays, const Surface& surface,
@@ -77,10 +95,7 @@ void WavePoints::addTexel(const RayScene& rays, const Atlas& atlas, const TexelF
 
 void WavePoints::leaveOut(std::size_t lane) {
   active_[lane] = 0;
-  for (SurfaceLanes& surface : surfaces_) {
-    surface.frame.set(lane, {Vec3(0.0f), Vec3(0.0f), Vec3(0.0f)});
-    surface.ng.set(lane, Vec3(0.0f));
-  }
+  setFrame(lane, {Vec3(0.0f), Vec3(0.0f), Vec3(0.0f)}, Vec3(0.0f));
 }
 
 bool WavePoints::turns(std::size_t lane) const {
@@ -94,11 +109,11 @@ bool WavePoints::turns(std::size_t lane) const {
 
 /// As TexelFootprint::sample: u.x chooses the piece, and what is left of it the reach within.
 LUMEL_FOR_EACH_CPU void WavePoints::choose(std::span<const Piece> pieces, float area, std::uint32_t seed,
-                                           std::uint32_t first, Places& places) {
+                                           const std::uint32_t* reversedIndices, Places& places) {
   alignas(64) float target[kMost];
   alignas(64) float y[kMost];
   for (std::uint32_t i = 0; i < kMost; ++i) {
-    const Vec2 u = sobol2D(first + i, seed);
+    const Vec2 u = sobol2DOfReversed(reversedIndices[i], seed);
     target[i] = u.x * area;
     y[i] = u.y;
   }
@@ -194,31 +209,42 @@ void WavePoints::draw(const std::array<TexelSampler, kLanes>& samplers, std::uin
                       std::uint32_t count) {
   LUMEL_CHECK(count >= 1 && count <= kMost && (count & (count - 1)) == 0);
   mask_ = count - 1;
-  Drawn drawn;
+  alignas(64) std::uint32_t reversedIndices[kMost];
+  for (std::uint32_t i = 0; i < kMost; ++i) reversedIndices[i] = reverseBits(first + i);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (!active_[lane]) continue;
     Places& places = places_[lane];
     choose(std::span(pieces_).subspan(firstPiece_[lane], firstPiece_[lane + 1] - firstPiece_[lane]),
-           static_cast<float>(areas_[lane]), samplers[lane].seedOf(pattern), first, places);
+           static_cast<float>(areas_[lane]), samplers[lane].seedOf(pattern), reversedIndices, places);
     for (std::uint32_t s = firstSource_[lane]; s < firstSource_[lane + 1]; ++s) {
-      locate(sources_[s], s, places, drawn);
-      if (turns_[lane]) locateFrames(sources_[s], s, places, drawn);
-    }
-    const auto hand = [&](const float(&from)[3][kMost], std::uint32_t i, Vec3Lanes& to) {
-      to.x[lane] = from[0][i];
-      to.y[lane] = from[1][i];
-      to.z[lane] = from[2][i];
-    };
-    for (std::uint32_t i = 0; i < count; ++i) {
-      hand(drawn.p, i, p_[i]);
-      hand(drawn.rayStart, i, rayStarts_[i]);
-      if (!turns_[lane]) continue;
-      hand(drawn.t, i, surfaces_[i].frame.t);
-      hand(drawn.b, i, surfaces_[i].frame.b);
-      hand(drawn.n, i, surfaces_[i].frame.n);
-      hand(drawn.ng, i, surfaces_[i].ng);
+      locate(sources_[s], s, places, drawn_[lane]);
+      if (turns_[lane]) locateFrames(sources_[s], s, places, drawn_[lane]);
     }
   }
+  turnToLanes(drawn_.data(), turning_, p_.data(), rayStarts_.data(), surfaces_.data());
+}
+
+/// From points by texel to texels by point.
+LUMEL_FOR_EACH_CPU void WavePoints::turnToLanes(const Drawn* drawn, bool turning, Vec3Lanes* p, Vec3Lanes* rayStarts,
+                                                SurfaceLanes* surfaces) {
+  const auto turn = [&](float(Drawn::*member)[3][kMost], auto lanesOf) {
+    for (std::size_t k = 0; k < 3; ++k)
+      for (std::size_t first = 0; first < kMost; first += 8) {
+        std::array<LaneWords, 8> columns;
+        turnRows<8>([&](std::size_t lane) { return &(drawn[lane].*member)[k][first]; }, columns);
+        for (std::size_t i = 0; i < 8; ++i) {
+          Vec3Lanes& to = lanesOf(first + i);
+          std::memcpy(k == 0 ? to.x : k == 1 ? to.y : to.z, &columns[i], sizeof to.x);
+        }
+      }
+  };
+  turn(&Drawn::p, [&](std::size_t i) -> Vec3Lanes& { return p[i]; });
+  turn(&Drawn::rayStart, [&](std::size_t i) -> Vec3Lanes& { return rayStarts[i]; });
+  if (!turning) return;
+  turn(&Drawn::t, [&](std::size_t i) -> Vec3Lanes& { return surfaces[i].frame.t; });
+  turn(&Drawn::b, [&](std::size_t i) -> Vec3Lanes& { return surfaces[i].frame.b; });
+  turn(&Drawn::n, [&](std::size_t i) -> Vec3Lanes& { return surfaces[i].frame.n; });
+  turn(&Drawn::ng, [&](std::size_t i) -> Vec3Lanes& { return surfaces[i].ng; });
 }
 
 PlaceOnTriangle WavePoints::place(std::size_t lane, std::uint32_t i) const {

@@ -43,7 +43,7 @@ class WavePoints {
   /// Covered area in texels; 0: nothing to sample.
   double area(std::size_t lane) const { return areas_[lane]; }
   bool covered(std::size_t lane) const { return active_[lane] != 0; }
-  /// From now on the lane is without a texel.
+  /// From the next draw on the lane is without a texel.
   void leaveOut(std::size_t lane);
 
   /// Draws samples [first, first + count) of a pattern, count <= kMost a power of two: point i of every texel is its
@@ -84,7 +84,7 @@ class WavePoints {
     float x[kMost];
     float y[kMost];
   };
-  /// The same points in space.
+  /// The same points in space; of texels that do not turn, frame and ng are set once.
   struct alignas(64) Drawn {
     float p[3][kMost];
     float rayStart[3][kMost];
@@ -100,9 +100,11 @@ class WavePoints {
   static Source sourceOf(const RayScene& rays, const Surface& surface, const TexelFootprint::Source& from);
   void addTexel(const RayScene& rays, const Atlas& atlas, const TexelFootprint& footprint, std::size_t lane);
   bool turns(std::size_t lane) const;
-  static void choose(std::span<const Piece> pieces, float area, std::uint32_t seed, std::uint32_t first,
-                     Places& places);
+  void setFrame(std::size_t lane, const Frame& frame, const Vec3& ng);
+  static void choose(std::span<const Piece> pieces, float area, std::uint32_t seed,
+                     const std::uint32_t* reversedIndices, Places& places);
   static void locate(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
+  static void turnToLanes(const Drawn* drawn, bool turning, Vec3Lanes* p, Vec3Lanes* rayStarts, SurfaceLanes* surfaces);
   static void locateFrames(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
 
   std::array<double, kLanes> areas_{};
@@ -118,6 +120,7 @@ class WavePoints {
   std::array<Vec3Lanes, kMost> rayStarts_;
   std::array<SurfaceLanes, kMost> surfaces_;  // the first alone where no texel turns
   std::array<Places, kLanes> places_;
+  std::array<Drawn, kLanes> drawn_;
 };
 
 }  // namespace lumel
