@@ -363,12 +363,14 @@ float GatherIntegrator::weightOf(std::size_t texel) const {
 
 void GatherIntegrator::substituteInvalid() {
   std::vector<std::uint8_t> valid(map_.size());
-  for (std::size_t t = 0; t < valid.size(); ++t) valid[t] = 2 * backFaces_[t] <= samplesOf_[t] ? 1 : 0;
-  substitutes_ = map_.substitutes(valid);
-  // Of texels wholly inside only rays from inside see anything, and these must not bring the light out there to texels
-  // that are partly in the open.
-  std::erase_if(substitutes_,
-                [&](const TexelMap::Substitute& s) { return 16 * backFaces_[s.texel] >= 15 * samplesOf_[s.texel]; });
+  std::vector<std::uint8_t> wanting(map_.size());
+  for (std::size_t t = 0; t < valid.size(); ++t) {
+    valid[t] = 2 * backFaces_[t] <= samplesOf_[t] ? 1 : 0;
+    // Of texels wholly inside only rays from inside see anything, and these must not bring the light out there to
+    // texels that are partly in the open.
+    wanting[t] = 16 * backFaces_[t] < 15 * samplesOf_[t] ? 1 : 0;
+  }
+  substitutes_ = map_.substitutes(wanting, valid);
 }
 
 void GatherIntegrator::findBuried() {

@@ -323,13 +323,14 @@ std::vector<std::uint8_t> TexelMap::buried(std::span<const std::uint8_t> hidden,
   return found;
 }
 
-std::vector<TexelMap::Substitute> TexelMap::substitutes(std::span<const std::uint8_t> valid) const {
+std::vector<TexelMap::Substitute> TexelMap::substitutes(std::span<const std::uint8_t> wanting,
+                                                        std::span<const std::uint8_t> valid) const {
   const std::vector<std::uint8_t> charts = chartsWith(valid);
   const std::vector<std::uint8_t> tileIsValid = tilesWith(valid);
   std::vector<Substitute> all;
   for (std::size_t p = 0; p < texels_.size(); ++p)
-    for (std::uint32_t i = 0; i < texels_[p].size(); ++i)
-      if (!valid[firstOfPage_[p] + i] && charts[chartOf(texels_[p], i)]) all.push_back({firstOfPage_[p] + i, kNoTexel});
+    for (std::uint32_t t = firstOfPage_[p]; t < firstOfPage_[p + 1]; ++t)
+      if (wanting[t] && !valid[t] && charts[chartOf(texels_[p], t - firstOfPage_[p])]) all.push_back({t, kNoTexel});
   parallelFor(all.size(), 64, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       const std::size_t page = pageOf(all[i].texel);

@@ -40,13 +40,13 @@ class TexelMap {
     findTexels(lookup);
   }
 
-  /// For each texel that is not `valid`: the nearest valid one of the same chart, within kReach texels; pairs of
-  /// (texel, source) in the order of texels. Texels without such a neighbour are left out.
+  /// For each texel that is `wanting` and not `valid`: the nearest valid one of the same chart, within kReach texels;
+  /// pairs of (texel, source) in the order of texels. Texels without such a neighbour are left out.
   struct Substitute {
     std::uint32_t texel = 0;
     std::uint32_t source = 0;
   };
-  std::vector<Substitute> substitutes(std::span<const std::uint8_t> valid) const;
+  std::vector<Substitute> substitutes(std::span<const std::uint8_t> wanting, std::span<const std::uint8_t> valid) const;
   static constexpr int kReach = 16;
 
   /// Of the texels that are `hidden` for certain, those whose chart has one that is `valid`.
@@ -111,9 +111,8 @@ struct TexelMap::Lookup {
   alignas(64) std::array<std::uint32_t, kLanes> parts;  // of RayScene::parts, where there is a hit
   // Bits of lanes:
   std::uint32_t behind;  // the hit is on the back
-  std::uint32_t
-      others;          // the texel does not tell all: the hit is on the back, on what shines by itself or has no texel
-  std::uint32_t near;  // the ray is shorter than kNearTexels texels of what it hit: one value is too coarse
+  std::uint32_t others;  // the texel does not tell all: a back, something that shines by itself, or no texel at all
+  std::uint32_t near;    // the ray is shorter than kNearTexels texels of what it hit: one value is too coarse
   static constexpr float kNearTexels = 1.5f;
 
  private:
