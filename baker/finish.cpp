@@ -1,6 +1,7 @@
 #include "baker/finish.h"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "lightmap/denoise.h"
@@ -11,6 +12,7 @@ namespace lumel {
 namespace {
 
 constexpr float kLeastValidity = 0.5f;
+constexpr std::size_t kTexelsPerTask = 1024;
 
 /// What is known of a page's texels, row by row.
 struct PageState {
@@ -18,10 +20,18 @@ struct PageState {
   TexelMask valid;
   std::vector<std::uint8_t> holes;      // covered, not valid
   std::vector<std::uint32_t> chartIds;  // 0: none, else chart + 1; the first where several share a texel
+  std::vector<CoarseNormal> normals;    // where there are charts, for the denoiser alone
   bool hasHoles = false;
 };
 
-PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& texels, bool needCharts) {
+/// Of the covered part's middle.
+CoarseNormal normalOf(TexelFootprint& footprint) {
+  const Vec3 n = footprint.centroid().frame.n * kCoarseNormal;
+  return {static_cast<std::int8_t>(std::lround(n.x)), static_cast<std::int8_t>(std::lround(n.y)),
+          static_cast<std::int8_t>(std::lround(n.z))};
+}
+
+PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& texels, bool forDenoising) {
   const std::size_t count = page.aux.pixels.size() / 4;
   PageState state;
   state.covered = state.valid = {page.aux.width, page.aux.height, std::vector<std::uint8_t>(count, 0)};
@@ -33,14 +43,19 @@ PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& t
     (aux[1] < kLeastValidity ? state.holes[i] : state.valid.known[i]) = 1;
   }
   state.hasHoles = std::find(state.holes.begin(), state.holes.end(), 1) != state.holes.end();
-  if (!state.hasHoles && !needCharts) return state;
+  if (!state.hasHoles && !forDenoising) return state;
   state.chartIds.assign(count, 0);
-  for (std::size_t texel = 0; texel < texels.size(); ++texel) {
-    const TexelCoord at = texels.coords[texel];
-    const TriangleRef triangle = texels.trianglesOf(texel).front();
-    state.chartIds[static_cast<std::size_t>(at.y) * static_cast<std::size_t>(page.aux.width) + at.x] =
-        atlas.surfaces[triangle.surface].charts[triangle.triangle] + 1;
-  }
+  if (forDenoising) state.normals.assign(count, CoarseNormal{});
+  parallelFor(texels.size(), kTexelsPerTask, [&](std::size_t first, std::size_t last) {
+    TexelFootprint footprint;
+    for (std::size_t texel = first; texel < last; ++texel) {
+      const TexelCoord at = texels.coords[texel];
+      const TriangleRef triangle = texels.trianglesOf(texel).front();
+      const std::size_t i = static_cast<std::size_t>(at.y) * static_cast<std::size_t>(page.aux.width) + at.x;
+      state.chartIds[i] = atlas.surfaces[triangle.surface].charts[triangle.triangle] + 1;
+      if (forDenoising && footprint.clip(atlas, texels, texel) > 0.0) state.normals[i] = normalOf(footprint);
+    }
+  });
   return state;
 }
 
@@ -48,7 +63,7 @@ void denoisePage(BakedPage& page, const PageState& state) {
   std::vector<std::uint32_t> charts = state.chartIds;
   for (std::size_t i = 0; i < charts.size(); ++i)
     if (state.valid.known[i] == 0) charts[i] = 0;
-  denoise(page.flat, page.rnm, charts, std::span(page.aux.pixels).subspan(2), 4);
+  denoise(page.flat, page.rnm, charts, state.normals, std::span(page.aux.pixels).subspan(2), 4);
 }
 
 }  // namespace

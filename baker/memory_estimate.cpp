@@ -17,9 +17,9 @@ constexpr double kBase = 145e6;
 // to texels. The warm-up before it takes less: its links are 32.
 constexpr double kSamplingPerCovered = 124.0;
 constexpr double kSamplingPerPageTexel = 0.5;
-// Finishing: places; the five images 64, the denoiser's strips, charts and masks.
+// Finishing: places; the five images 64, what the denoiser knows of texels and its strips 17, charts and masks.
 constexpr double kFinishingPerCovered = 16.0;
-constexpr double kFinishingPerPageTexel = 80.0;
+constexpr double kFinishingPerPageTexel = 88.0;
 
 // Bytes per triangle. Charts: the scene 24 and more, half-edges 31, the tree of merges 8; of one chart its mesh 34,
 // places and their moves 16, factor and what belongs to it 78. Sampling: the scene and its surfaces

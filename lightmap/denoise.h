@@ -1,6 +1,6 @@
-// Takes sampling noise out of a finished page: every texel becomes a weighted mean of itself and of pairs of opposite
-// texels of its chart around it that agree with it within their noise (non-local means with known variance: Buades et
-// al. 2005; Rousselle et al. 2012, "Adaptive Rendering with Non-Local Means Filtering", eq. 4).
+// Takes sampling noise out of a finished page: every texel becomes a weighted mean of itself and of the texels of its
+// chart around it that agree with it within their noise (non-local means with known variance: Buades et al. 2005;
+// Rousselle et al. 2012, "Adaptive Rendering with Non-Local Means Filtering", eq. 4).
 #pragma once
 
 #include <array>
@@ -11,16 +11,18 @@
 
 namespace lumel {
 
-/// Texels up to so far apart, in x and in y, are compared and averaged.
-inline constexpr int kDenoiseRadius = 5;
+/// A unit vector times kCoarseNormal, rounded.
+using CoarseNormal = std::array<std::int8_t, 3>;
+inline constexpr float kCoarseNormal = 127.0f;
 
 /// `flat` and `rnm`: RGB images of one size. Per texel, row by row: `chartIds`, 0 where a texel is neither read nor
-/// changed; the standard error of the flat map's luminance, `stride` floats apart. All four maps of a texel are
-/// averaged with the same weights, so what holds for them linearly (the mean of the three maps is the flat one) goes on
-/// to hold. A texel without noise keeps its value among texels that differ from it, but for one factor to all texels
-/// and maps of a chart, by which the chart keeps its flat map's mean luminance. Values that are not finite spread no
-/// further than the texel. Parallel and deterministic. Memory: 4.5 KiB per texel of the page's width.
+/// changed; `normals`, zero where a texel shall agree with no other; the standard error of the flat map's luminance,
+/// `stride` floats apart. All four maps of a texel are averaged with the same weights, so what holds for them linearly
+/// (the mean of the three maps is the flat one) goes on to hold. A texel without noise keeps its value among texels that
+/// differ from it, but for one factor to all texels and maps of a chart, by which the chart keeps its flat map's mean
+/// luminance. Values that are not finite spread no further than the texel. Parallel and deterministic. Memory: 4 bytes
+/// per texel and 6.5 KiB per texel of the page's width.
 void denoise(Image& flat, std::array<Image, 3>& rnm, std::span<const std::uint32_t> chartIds,
-             std::span<const float> standardError, std::size_t stride = 1);
+             std::span<const CoarseNormal> normals, std::span<const float> standardError, std::size_t stride = 1);
 
 }  // namespace lumel

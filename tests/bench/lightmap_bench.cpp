@@ -153,11 +153,12 @@ void BM_Denoise(benchmark::State& state) {
     const std::size_t x = i % side, y = i / side;
     if (x % 101 < 96 && y % 101 < 96) charts[i] = static_cast<std::uint32_t>(1 + x / 101 + y / 101 * 11);
   }
+  const std::vector<CoarseNormal> normals(charts.size(), CoarseNormal{0, 0, 127});
   const std::vector<float> errors(charts.size(), 0.05f);
   for (auto _ : state) {
     Image flat = map;
     std::array<Image, 3> rnm = {map, map, map};
-    denoise(flat, rnm, charts, errors);
+    denoise(flat, rnm, charts, normals, errors);
     benchmark::DoNotOptimize(flat.pixels.data());
   }
 }
