@@ -1,7 +1,5 @@
 #include "baker/bake.h"
 
-#include <xmmintrin.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -10,6 +8,7 @@
 #include <span>
 
 #include "baker/doubling_error.h"
+#include "baker/flush_denormals.h"
 #include "baker/gather_integrator.h"
 #include "baker/path_integrator.h"
 #include "scene/parallel.h"
@@ -25,18 +24,6 @@ constexpr int kLongestPath = 64;
 
 /// Samples where nothing shines: only validity is left to find out.
 constexpr int kSamplesInTheDark = 8;
-
-/// Denormals are flushed while it lives: they are far below any light that a map can show and slow rays down.
-class FlushDenormals {
- public:
-  FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040u); }  // FTZ | DAZ
-  ~FlushDenormals() { _mm_setcsr(saved_); }
-  FlushDenormals(const FlushDenormals&) = delete;
-  FlushDenormals& operator=(const FlushDenormals&) = delete;
-
- private:
-  unsigned int saved_;
-};
 
 /// Up to kLanes consecutive texels of a page.
 struct Wave {

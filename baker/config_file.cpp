@@ -68,7 +68,8 @@ class ConfigReader {
     if (!option) {
       std::string message = "unknown key '" + name + "'";
       if (const auto near = options_.nearest(name)) message += "; did you mean '" + *near + "'?";
-      return at(line, message + " (keys are the options of 'lumel " + command_ + " --help')");
+      return at(line, message + " (keys are the options of 'lumel " + command_ +
+                          " --help' but for --quiet, --config and --help)");
     }
     auto values = texts(node);
     if (!values) return at(line, name + ": a table or a date cannot be a value here");

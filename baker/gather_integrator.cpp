@@ -1,11 +1,10 @@
 #include "baker/gather_integrator.h"
 
-#include <xmmintrin.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 
+#include "baker/flush_denormals.h"
 #include "scene/parallel.h"
 #include "scene/stopwatch.h"
 
@@ -148,13 +147,11 @@ Expected<void> GatherIntegrator::forEachWave(Progress& progress, Body body) {
   };
   std::vector<Counts> counts(waves_.size());
   parallelFor(waves_.size(), 1, [&](std::size_t first, std::size_t last) {
-    const unsigned int saved = _mm_getcsr();
-    _mm_setcsr(saved | 0x8040u);  // FTZ | DAZ: denormals are far below any light and slow rays down
+    const FlushDenormals flush;
     for (std::size_t w = first; w < last && !progress.cancelled(); ++w) {
       GatheredWave done = body(w);
       counts[w] = {done.rays, done.shadowRays, std::move(done.nonFinite)};
     }
-    _mm_setcsr(saved);
   });
   if (progress.cancelled()) return interrupted();
   for (const Counts& c : counts) {

@@ -267,7 +267,7 @@ void Studying::compare(const std::vector<BakedPage>& pages, StudyPoint& point) c
     within += std::abs(static_cast<double>(luminance(maps.flat[i])) - expected) <=
               1.96 * std::hypot(error, static_cast<double>(truth_.standardError[i]));
   }
-  point.withinInterval = lit > 0 ? static_cast<double>(within) / static_cast<double>(lit) : 0.0;
+  if (lit > 0 && claimed > 0.0) point.withinInterval = static_cast<double>(within) / static_cast<double>(lit);
   point.claimed = std::sqrt(claimed / static_cast<double>(std::max<std::size_t>(1, maps.flat.size()))) / mean;
   point.hasMaps = true;
 }

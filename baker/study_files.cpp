@@ -40,7 +40,7 @@ std::string tableOfSamples(const Study& study) {
           " | " + format("%.0f", raysPerTexel(p)) + " | " + format("%.2f", p.cpuSeconds) + " | " +
           format("%.2f", p.seconds) + " | " + percent(p.flat.rmse) + " | " + format("%+.2f%%", 100.0 * p.flat.bias) +
           " | " + percent(p.rnm.rmse) + " | " + format("%+.2f%%", 100.0 * p.rnm.bias) + " | " +
-          format("%.1f%%", 100.0 * p.withinInterval) + " |\n";
+          (p.withinInterval >= 0.0 ? format("%.1f%%", 100.0 * p.withinInterval) : "-") + " |\n";
   }
   return md;
 }
@@ -103,7 +103,7 @@ Json toJson(const StudyPoint& p) {
     json["flat"] = {{"rmse", p.flat.rmse}, {"bias", p.flat.bias}};
     json["rnm"] = {{"rmse", p.rnm.rmse}, {"bias", p.rnm.bias}};
     json["claimed"] = p.claimed;
-    json["withinInterval"] = p.withinInterval;
+    if (p.withinInterval >= 0.0) json["withinInterval"] = p.withinInterval;
   }
   if (p.residual >= 0.0) json["residual"] = p.residual;
   if (p.seen >= 0.0) json["seen"] = p.seen;
@@ -121,9 +121,10 @@ std::string studyCsv(const Study& study) {
            std::to_string(p.samples) + "," + format("%.6g", static_cast<double>(p.texelsPerMeter)) + "," +
            std::to_string(p.texels) + "," + std::to_string(p.rays) + "," + format("%.4f", p.seconds) + "," +
            format("%.4f", p.cpuSeconds);
-    for (const double v : {p.flat.rmse, p.flat.bias, p.rnm.rmse, p.rnm.bias, p.claimed, p.withinInterval})
+    for (const double v : {p.flat.rmse, p.flat.bias, p.rnm.rmse, p.rnm.bias, p.claimed})
       csv += "," + (p.hasMaps ? format("%.6g", v) : std::string());
-    for (const double v : {p.residual, p.seen}) csv += "," + (v >= 0.0 ? format("%.6g", v) : std::string());
+    for (const double v : {p.withinInterval, p.residual, p.seen})
+      csv += "," + (v >= 0.0 ? format("%.6g", v) : std::string());
     csv += "\n";
   }
   return csv;

@@ -86,6 +86,13 @@ TEST(Study, TheReferenceKnowsItsError) {
     }
 }
 
+TEST(Study, WithoutAnErrorNoShareIsWithinIt) {
+  for (const StudyPoint& p : cornellStudy().points)
+    if (p.hasMaps) {
+      EXPECT_EQ(p.withinInterval >= 0.0, p.claimed > 0.0) << p.series << " " << p.samples;
+    }
+}
+
 // It pays where there is noise; the test of the denoiser itself is lightmap's.
 TEST(Study, DenoisedBakesAreMeasuredBesideTheirOriginals) {
   const auto gather = seriesOf(cornellStudy(), "gather");
