@@ -65,10 +65,12 @@ Expected<Texture> Texture::decode(const ImageSource& source, ColorSpace space) {
   const bool bytes = loaded->bitsPerChannel <= 8;
   const std::size_t texels = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
   const auto channels = static_cast<std::size_t>(image.channels);
-  if (bytes)
-    texture.bytes_.resize(4 * texels);
-  else
+  if (bytes) {
+    texture.bytes_.resize(3 * texels);
+    texture.alphaBytes_.resize(texels);
+  } else {
     texture.floats_.resize(4 * texels);
+  }
   for (std::size_t t = 0; t < texels; ++t) {
     const float* in = &image.pixels[t * channels];
     const bool grey = channels < 3;
@@ -77,7 +79,7 @@ Expected<Texture> Texture::decode(const ImageSource& source, ColorSpace space) {
     if (channels >= 4) rgba[3] = in[3];
     for (std::size_t c = 0; c < 4; ++c) {
       if (bytes)
-        texture.bytes_[4 * t + c] = static_cast<std::uint8_t>(std::lround(std::clamp(rgba[c], 0.0f, 1.0f) * 255.0f));
+        texture.byteOf(t, c) = static_cast<std::uint8_t>(std::lround(std::clamp(rgba[c], 0.0f, 1.0f) * 255.0f));
       else
         // Float files (EXR, HDR) are linear already; 16-bit ones are encoded as 8-bit ones are.
         texture.floats_[4 * t + c] =
@@ -98,19 +100,25 @@ void Texture::sortAlpha() {
       alphaBlocks_[blockOf(x, y)] |=
           static_cast<std::uint8_t>((alpha != 1.0f ? kSomeTransparent : 0) | (alpha != 0.0f ? kSomeVisible : 0));
     }
-  if (opaque_) alphaBlocks_ = {};
+  if (!opaque_) return;
+  alphaBlocks_ = std::vector<std::uint8_t>();  // `= {}` would keep the memory
+  alphaBytes_ = std::vector<std::uint8_t>();
 }
 
 Vec4 Texture::fetch(int x, int y) const {
-  const std::size_t first = indexOf(x, y);
-  if (bytes_.empty()) return {floats_[first], floats_[first + 1], floats_[first + 2], floats_[first + 3]};
+  const std::size_t texel = texelAt(x, y);
+  if (bytes_.empty()) {
+    const float* rgba = &floats_[4 * texel];
+    return {rgba[0], rgba[1], rgba[2], rgba[3]};
+  }
   const Table& table = tableOf(space_);
-  return {table[bytes_[first]], table[bytes_[first + 1]], table[bytes_[first + 2]], fetchAlpha(x, y)};
+  const std::uint8_t* rgb = &bytes_[3 * texel];
+  return {table[rgb[0]], table[rgb[1]], table[rgb[2]], fetchAlpha(x, y)};
 }
 
 float Texture::fetchAlpha(int x, int y) const {
-  const std::size_t alpha = indexOf(x, y) + 3;
-  return bytes_.empty() ? floats_[alpha] : static_cast<float>(bytes_[alpha]) / 255.0f;
+  if (bytes_.empty()) return floats_[4 * texelAt(x, y) + 3];
+  return alphaBytes_.empty() ? 1.0f : static_cast<float>(alphaBytes_[texelAt(x, y)]) / 255.0f;
 }
 
 Texture::Footprint Texture::footprint(const TextureRef& ref, Vec2 uv) const {
@@ -154,11 +162,11 @@ void Texture::prefetch(const TextureRef& ref, Vec2 uv) const {
   // Of the footprint's two rows, the left texels: the right ones mostly share their cache lines.
   const Footprint at = footprint(ref, uv);
   for (const int y : at.rows) {
-    const std::size_t first = indexOf(at.columns[0], y);
+    const std::size_t texel = texelAt(at.columns[0], y);
     if (bytes_.empty())
-      __builtin_prefetch(&floats_[first]);
+      __builtin_prefetch(&floats_[4 * texel]);
     else
-      __builtin_prefetch(&bytes_[first]);
+      __builtin_prefetch(&bytes_[3 * texel]);
   }
 }
 
@@ -167,8 +175,11 @@ Texture Texture::halved() const {
   half.width_ = std::max(width_ / 2, 1);
   half.height_ = std::max(height_ / 2, 1);
   half.space_ = space_;
-  const std::size_t values = 4 * static_cast<std::size_t>(half.width_) * static_cast<std::size_t>(half.height_);
-  (bytes_.empty() ? half.floats_.resize(values) : half.bytes_.resize(values));
+  half.opaque_ = opaque_;
+  const std::size_t texels = static_cast<std::size_t>(half.width_) * static_cast<std::size_t>(half.height_);
+  half.floats_.resize(bytes_.empty() ? 4 * texels : 0);
+  half.bytes_.resize(bytes_.empty() ? 0 : 3 * texels);
+  half.alphaBytes_.resize(alphaBytes_.empty() ? 0 : texels);
   // Texel i of n covers source texels i * size / n to (i + 1) * size / n, whose ends may lie inside one.
   const auto share = [](std::int64_t source, std::int64_t i, std::int64_t n, std::int64_t size) {
     return static_cast<float>(std::min((source + 1) * n, (i + 1) * size) - std::max(source * n, i * size)) /
@@ -178,18 +189,18 @@ Texture Texture::halved() const {
   const auto end = [](std::int64_t i, std::int64_t n, std::int64_t size) {
     return static_cast<int>(((i + 1) * size + n - 1) / n);
   };
-  std::size_t out = 0;
   for (int y = 0; y < half.height_; ++y)
     for (int x = 0; x < half.width_; ++x) {
       Vec4 mean(0.0f);
       for (int v = first(y, half.height_, height_); v < end(y, half.height_, height_); ++v)
         for (int u = first(x, half.width_, width_); u < end(x, half.width_, width_); ++u)
           mean += share(u, x, half.width_, width_) * share(v, y, half.height_, height_) * fetch(u, v);
-      for (int c = 0; c < 4; ++c, ++out) {
+      const std::size_t texel = half.texelAt(x, y);
+      for (int c = 0; c < 4; ++c) {
         if (bytes_.empty())
-          half.floats_[out] = mean[c];
-        else
-          half.bytes_[out] = static_cast<std::uint8_t>(std::lround(
+          half.floats_[4 * texel + static_cast<std::size_t>(c)] = mean[c];
+        else if (c < 3 || !alphaBytes_.empty())
+          half.byteOf(texel, static_cast<std::size_t>(c)) = static_cast<std::uint8_t>(std::lround(
               255.0f * std::clamp(space_ == ColorSpace::Srgb && c < 3 ? linearToSrgb(mean[c]) : mean[c], 0.0f, 1.0f)));
       }
     }

@@ -20,7 +20,7 @@ class Texture {
 
   int width() const { return width_; }
   int height() const { return height_; }
-  std::size_t bytes() const { return bytes_.size() + floats_.size() * sizeof(float); }
+  std::size_t bytes() const { return bytes_.size() + alphaBytes_.size() + floats_.size() * sizeof(float); }
   /// Whether alpha is 1 everywhere.
   bool opaque() const { return opaque_; }
 
@@ -51,20 +51,24 @@ class Texture {
 
   Footprint footprint(const TextureRef& ref, Vec2 uv) const;
   float fetchAlpha(int x, int y) const;
-  std::size_t indexOf(int x, int y) const {
-    return 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x));
+  std::size_t texelAt(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
   }
   std::size_t blockOf(int x, int y) const {
     return static_cast<std::size_t>(y / kBlock) * static_cast<std::size_t>((width_ + kBlock - 1) / kBlock) +
            static_cast<std::size_t>(x / kBlock);
+  }
+  std::uint8_t& byteOf(std::size_t texel, std::size_t channel) {
+    return channel < 3 ? bytes_[3 * texel + channel] : alphaBytes_[texel];
   }
   void sortAlpha();
 
   int width_ = 0;
   int height_ = 0;
   ColorSpace space_ = ColorSpace::Linear;
-  std::vector<std::uint8_t> bytes_;  // RGBA
-  std::vector<float> floats_;        // RGBA, linear
+  std::vector<std::uint8_t> bytes_;       // RGB
+  std::vector<std::uint8_t> alphaBytes_;  // beside bytes_, unless opaque: cut-outs read nothing else
+  std::vector<float> floats_;             // RGBA, linear
   bool opaque_ = false;
   std::vector<std::uint8_t> alphaBlocks_;  // AlphaKind; empty: not known, or all opaque
 };

@@ -36,6 +36,7 @@ TEST(Texture, SrgbDecodesColoursNotAlpha) {
   EXPECT_FLOAT_EQ(linear.fetch(0, 1).x, 0.4f);
   EXPECT_FLOAT_EQ(srgb.fetch(1, 0).w, 0.2f);
   EXPECT_EQ(srgb.bytes(), 16u);  // 8 bits stay 8 bits
+  EXPECT_EQ(decoded({"white", "", *encodePng(Image(2, 2, 4, 1.0f))}, ColorSpace::Srgb).bytes(), 12u);  // opaque
 }
 
 TEST(Texture, GreyReplicatesAndAlphaIsOne) {
