@@ -93,8 +93,10 @@ void storeTexel(BakedPage& page, TexelCoord at, const TexelResult& texel, Projec
   storeAux(page.aux, at, baked, value.flat, rnm, stats);
 }
 
-/// Fewest samples of which an error is known: of the gather two passes.
-std::uint32_t fewestForError(Integrator integrator) { return integrator == Integrator::Gather ? 16 : 2; }
+/// Fewest samples of which an error is known.
+std::uint32_t fewestForError(Integrator integrator) {
+  return integrator == Integrator::Gather ? 2 * GatherIntegrator::kFirstPass : 2;
+}
 
 BakeStats sumUp(std::span<const WaveStats> waves, const BakeOptions& options) {
   BakeStats total;
@@ -305,6 +307,7 @@ Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vec
   BakeOptions options = askedFor;
   if (transport.dark()) {
     options.samples = std::min(options.samples, kSamplesInTheDark);
+    options.bounces = 0;
     options.targetError = 0.0f;
   }
 

@@ -11,7 +11,6 @@
 namespace lumel {
 namespace {
 
-constexpr std::uint32_t kFirstPass = 8;
 /// Fewest samples after which an error estimate may end the work on a texel: two doublings.
 constexpr std::uint32_t kFirstJudged = 32;
 /// A wave that meets the target goes on with more than so many of the eight around it that do not (a straight border
@@ -73,12 +72,11 @@ GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKer
     : options_(options),
       map_(transport.rays, atlas, texels),
       scene_{.transport = transport, .kernels = kernels, .atlas = atlas, .texels = texels, .map = map_} {
-  const int bounces = transport.dark() ? 0 : options.bounces;
   scene_.seed = options.seed;
-  scene_.bounces = bounces;
+  scene_.bounces = options.bounces;
   scene_.indirectOnly = options.indirectOnly;
-  scene_.lastDepth = bounces < 0 ? kLongestPath : bounces;
-  scene_.levels = levelsFor(bounces);
+  scene_.lastDepth = options.bounces < 0 ? kLongestPath : options.bounces;
+  scene_.levels = levelsFor(options.bounces);
   for (std::uint32_t p = 0; p < texels.size(); ++p) {
     firstWave_.push_back(waves_.size());
     for (std::size_t first = 0; first < texels[p].size(); first += kLanes)

@@ -86,6 +86,9 @@ struct WarmLinks {
 /// judged.
 class GatherIntegrator {
  public:
+  /// Samples of the first pass; once they are doubled errors are known.
+  static constexpr std::uint32_t kFirstPass = 8;
+
   /// Keeps references to its arguments.
   GatherIntegrator(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
                    const std::vector<PageTexels>& texels, const GatherOptions& options);

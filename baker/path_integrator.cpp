@@ -34,9 +34,7 @@ struct Path {
 class WaveTracer {
  public:
   WaveTracer(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas, const PathOptions& options)
-      : transport_(transport), kernels_(kernels), atlas_(atlas), options_(options) {
-    lastDepth_ = transport.dark() ? 0 : options.bounces;
-  }
+      : transport_(transport), kernels_(kernels), atlas_(atlas), options_(options) {}
 
   WaveResult run(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count);
 
@@ -60,7 +58,6 @@ class WaveTracer {
   const RnmKernels& kernels_;
   const Atlas& atlas_;
   const PathOptions& options_;
-  int lastDepth_ = 0;
 
   std::uint32_t page_ = 0;
   std::array<TexelCoord, kLanes> coords_;
@@ -197,7 +194,7 @@ void WaveTracer::followPaths() {
                                         path.radiance += path.beta * light * (cosTheta * kInvPi);
                                       });
     // The last ray of a path only looks for what shines by itself.
-    if (depth + 1 == lastDepth_ && !transport_.raysSeeLight()) break;
+    if (depth + 1 == options_.bounces && !transport_.raysSeeLight()) break;
     if (!scatter(depth)) break;
   }
 }
@@ -206,7 +203,7 @@ void WaveTracer::followPaths() {
 void WaveTracer::findHits(int depth) {
   for (int lane = 0; lane < kLanes; ++lane)
     if (rays_.hit(lane)) hits_[static_cast<std::size_t>(lane)] = transport_.rays.surfaceAt(rays_, lane);
-  if (depth == lastDepth_) return;
+  if (depth == options_.bounces) return;
   for (int lane = 0; lane < kLanes; ++lane)
     if (rays_.hit(lane)) transport_.materials.prefetchAlbedo(hits_[static_cast<std::size_t>(lane)].point);
 }
@@ -228,7 +225,7 @@ bool WaveTracer::shadeHit(int lane, int depth) {
   const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
   if (emitted != Vec3(0.0f) && !leavesOut(depth))
     path.radiance += path.beta * emitted * misWeight(path.pdf, transport_.emissive.pdf(hit, path.origin));
-  if (depth == lastDepth_) return false;
+  if (depth == options_.bounces) return false;
   path.beta *= transport_.materials.albedo(hit.point);
   if (path.beta == Vec3(0.0f)) return false;
   lanes_.receivers[l] = {hit.p, hit.ng, transport_.rays.shadingNormal(hit), transport_.rays.rayStart(hit)};
