@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "baker/flush_denormals.h"
+#include "scene/check.h"
 #include "scene/parallel.h"
 #include "scene/stopwatch.h"
 
@@ -39,6 +40,8 @@ constexpr double kCertain = 8.0;
 /// A texel more of which sees nothing but backs is invalid. Where its chart has no better ones it may be in a room that
 /// is inside out, and all that it found counts.
 constexpr float kMostInside = 0.6f;
+/// Of a texel's kWarmRays: where more meet backs its wave is not guided.
+constexpr int kMostGuidedBacks = 2;
 /// Inside of something whose chart nobody sees texels darker than this share of the mean need no more samples.
 constexpr double kDarkInside = 0.01;
 
@@ -50,15 +53,38 @@ CacheLevels levelsFor(int bounces) {
   return {.count = count, .base = bounces - count, .endless = false};
 }
 
-/// Adds a wave's links to the table.
-void keepLinks(std::span<const CacheLink> found, std::span<std::uint32_t> texels,
-               std::vector<WarmLinks::Share>& shares) {
+/// Enters a wave's links, from link `first` on.
+void keepLinks(std::span<const CacheLink> found, std::size_t wave, std::size_t first, WarmLinks& links) {
   static const std::uint32_t whole = packWeight(Vec3(1.0f));
   for (std::uint32_t i = 0; i < found.size(); ++i) {
-    texels[i] = found[i].texel;
-    if (found[i].texel != kNoTexel && found[i].weight != whole) shares.push_back({i, found[i].weight});
+    const CacheLink& link = found[i];
+    const bool isTexel = link.texel != kNoTexel;
+    links.found[first + i] = isTexel ? link.texel : std::bit_cast<std::uint32_t>(-link.light);
+    links.bins[first + i] = static_cast<std::uint8_t>(link.bin);
+    if (isTexel && link.weight != whole) links.shares[wave].push_back({i, link.weight});
   }
 }
+
+/// The links of a wave one by one.
+class LinkReader {
+ public:
+  LinkReader(const WarmLinks& links, std::size_t wave, std::size_t first)
+      : found_(links.found.data() + first), share_(links.shares[wave].begin()), end_(links.shares[wave].end()) {}
+
+  bool isTexel() const { return found_[at_] < WarmLinks::kLight; }
+  /// What the texel of the link passes on.
+  Vec3 lightOf(std::span<const PackedColor> reflected) {
+    const Vec3 light = unpackColor(reflected[found_[at_]]);
+    return share_ != end_ && share_->link == at_ ? light * unpackWeight(share_++->weight) : light;
+  }
+  float seen() const { return -std::bit_cast<float>(found_[at_]); }
+  void next() { ++at_; }
+
+ private:
+  const std::uint32_t* found_;
+  std::vector<WarmLinks::Share>::const_iterator share_, end_;
+  std::uint32_t at_ = 0;
+};
 
 }  // namespace
 
@@ -97,6 +123,7 @@ void GatherIntegrator::makeCache() {
   samplesOf_.resize(map_.size());
   buried_.resize(map_.size());
   warmBacks_.resize(map_.size());
+  errors_.emplace(scene_.texels, kGatherCredit);
   if (scene_.levels.count == 0) return;
   reflectance_.resize(map_.size());
   if (!scene_.levels.endless) cache_.resize(map_.size() * stored());  // else it is what the warm-up ends with
@@ -114,7 +141,6 @@ void GatherIntegrator::makeSums() {
   if (!scene_.levels.endless) levelSums_.resize(count * stored());
   probes_.resize(probeCount_);
   if (!scene_.strategies.empty()) spreads_.resize(waves_.size() * (scene_.strategies.size() + 1));
-  errors_.emplace(scene_.texels, kGatherCredit);
 }
 
 /// What texel() does not need: its place is taken by the pages of the result.
@@ -126,6 +152,7 @@ void GatherIntegrator::dropCache() {
   seen_ = std::vector<Vec3>();
   spreads_ = std::vector<LightSpread>();
   substitutes_ = std::vector<TexelMap::Substitute>();
+  guides_ = std::vector<Guide>();
   scene_.reflectance = {};
 }
 
@@ -195,7 +222,9 @@ Expected<void> GatherIntegrator::run(Progress& progress) {
 Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   const std::size_t count = map_.size();
   WarmLinks links;
-  links.texels.resize(count * GatherWave::kWarmRays);
+  LUMEL_CHECK(count < WarmLinks::kLight);
+  links.found.resize(count * GatherWave::kWarmRays);
+  links.bins.resize(count * GatherWave::kWarmRays);
   links.shares.resize(waves_.size());
   std::vector<Vec3> first(count);     // light that needs no texel to be known: direct, and what rays see shine
   std::vector<Vec3> constant(count);  // the same and light from hits without texels
@@ -207,14 +236,13 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
     GatherWave texels(scene_, wave.page, wave.first, wave.count);
     std::array<CacheLink, std::size_t{kLanes} * GatherWave::kWarmRays> found;
     const auto warm = texels.warmUp(std::span(found).first(linkCount), counts);
-    keepLinks(std::span(found).first(linkCount),
-              std::span(links.texels).subspan(start * GatherWave::kWarmRays, linkCount), links.shares[w]);
+    keepLinks(std::span(found).first(linkCount), w, start * GatherWave::kWarmRays, links);
     for (std::size_t i = 0; i < wave.count; ++i) {
       reflectance_[start + i] = packColor(warm[i].reflectance);
       first[start + i] = warm[i].direct + warm[i].seen;
       constant[start + i] = first[start + i] + warm[i].relit;
       warmBacks_[start + i] = static_cast<std::uint8_t>(warm[i].backs);
-      backFaces_[start + i] = static_cast<std::uint32_t>(std::popcount(warm[i].backs));
+      backFaces_[start + i] = static_cast<float>(std::popcount(warm[i].backs));
       if (!scene_.indirectOnly) continue;
       direct_[start + i] = warm[i].direct;
       seen_[start + i] = warm[i].seen * static_cast<float>(GatherWave::kWarmRays);
@@ -225,14 +253,21 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   std::fill(samplesOf_.begin(), samplesOf_.end(), std::uint32_t{GatherWave::kWarmRays});
   findBuried();
   substituteInvalid();
-  solveLinks(links, std::move(first), constant);
+  std::vector<PackedColor> reflected = solveLinks(links, std::move(first), constant);
+  constant = std::vector<Vec3>();
+  makeGuides(links, reflected);
+  if (scene_.levels.endless) cache_ = std::move(reflected);
   scene_.reflectance = reflectance_;
   for (std::size_t t = 0; t < count; ++t)
-    if (!buried_[t]) backFaces_[t] = samplesOf_[t] = 0;
+    if (!buried_[t]) {
+      backFaces_[t] = 0.0f;
+      samplesOf_[t] = 0;
+    }
   return {};
 }
 
-void GatherIntegrator::solveLinks(const WarmLinks& links, std::vector<Vec3> light, std::span<const Vec3> constant) {
+std::vector<PackedColor> GatherIntegrator::solveLinks(const WarmLinks& links, std::vector<Vec3> light,
+                                                      std::span<const Vec3> constant) {
   const CacheLevels& levels = scene_.levels;
   const std::size_t count = map_.size();
   // What links look up: one product instead of two values from all over the memory.
@@ -256,17 +291,11 @@ void GatherIntegrator::solveLinks(const WarmLinks& links, std::vector<Vec3> ligh
       double sum = 0.0;
       for (std::size_t w = first; w < last; ++w) {
         const std::size_t start = map_.firstOfPage(waves_[w].page) + waves_[w].first;
-        const std::uint32_t* link = links.texels.data() + start * GatherWave::kWarmRays;
-        auto share = links.shares[w].begin();
-        std::uint32_t index = 0;
+        LinkReader link(links, w, start * GatherWave::kWarmRays);
         for (std::size_t t = start; t < start + waves_[w].count; ++t) {
           Vec3 found(0.0f);
-          for (int ray = 0; ray < GatherWave::kWarmRays; ++ray, ++index, ++link) {
-            if (*link == kNoTexel) continue;
-            Vec3 from = unpackColor(reflected[*link]);
-            if (share != links.shares[w].end() && share->link == index) from *= unpackWeight(share++->weight);
-            found += from;
-          }
+          for (int ray = 0; ray < GatherWave::kWarmRays; ++ray, link.next())
+            if (link.isTexel()) found += link.lightOf(reflected);
           light[t] = constant[t] + found / static_cast<float>(GatherWave::kWarmRays);
           sum += static_cast<double>(luminance(light[t]));
         }
@@ -280,7 +309,41 @@ void GatherIntegrator::solveLinks(const WarmLinks& links, std::vector<Vec3> ligh
     if (levels.endless && total - before <= kSettled * total) break;
     before = total;
   }
-  if (levels.endless) cache_ = std::move(reflected);
+  return reflected;
+}
+
+GuideTally GatherIntegrator::tallyOf(std::size_t wave, const WarmLinks& links,
+                                     std::span<const PackedColor> reflected) const {
+  const std::size_t first = (map_.firstOfPage(waves_[wave].page) + waves_[wave].first) * GatherWave::kWarmRays;
+  const std::size_t end = first + std::size_t{waves_[wave].count} * GatherWave::kWarmRays;
+  GuideTally tally;
+  LinkReader link(links, wave, first);
+  for (std::size_t i = first; i < end; ++i, link.next()) {
+    const float light = link.isTexel() ? luminance(link.lightOf(reflected)) : link.seen();
+    if (links.bins[i] < kGuideBins) tally.add(links.bins[i], light);
+  }
+  return tally;
+}
+
+void GatherIntegrator::makeGuides(const WarmLinks& links, std::span<const PackedColor> reflected) {
+  // Counts of rays tell what lies inside of things, so where backs are met they go to all sides alike.
+  const auto meetsBacks = [](std::uint8_t warmBacks) { return std::popcount(warmBacks) > kMostGuidedBacks; };
+  std::vector<GuideTally> tallies(waves_.size());
+  parallelFor(waves_.size(), kWaveGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t w = first; w < last; ++w) tallies[w] = tallyOf(w, links, reflected);
+  });
+  const GuideMaker maker(scene_.kernels);
+  guides_.resize(waves_.size());
+  parallelFor(waves_.size(), kWaveGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t w = first; w < last; ++w) {
+      const std::size_t start = map_.firstOfPage(waves_[w].page) + waves_[w].first;
+      if (std::ranges::any_of(std::span(warmBacks_).subspan(start, waves_[w].count), meetsBacks)) continue;
+      GuideTally around = tallies[w];  // counts twice
+      for (const std::uint32_t near : errors_->around(w))
+        if (near != DoublingError::kNone) around.add(tallies[near], 1.0f);
+      guides_[w] = maker.make(around);
+    }
+  });
 }
 
 Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Progress& progress) {
@@ -296,7 +359,7 @@ Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Pr
     GatheredWave done;
     if (first == 0 || std::ranges::count(buried, 0) > 0) {
       GatherWave texels(scene_, wave.page, wave.first, wave.count);
-      done = texels.gather(first, end, cache_, buried, spreadsOf(w));
+      done = texels.gather(first, end, cache_, buried, guides_.empty() ? Guide() : guides_[w], spreadsOf(w));
       for (std::size_t i = 0; i < wave.count; ++i) coverage_[start + i] = texels.coverage(i);
     }
     store(w, done, first, end);
@@ -352,7 +415,7 @@ void GatherIntegrator::store(std::size_t index, const GatheredWave& done, std::u
 
 float GatherIntegrator::weightOf(std::size_t texel) const {
   const auto samples = static_cast<float>(std::max(1u, samplesOf_[texel]));
-  const float inside = inside_[texel].share() * static_cast<float>(backFaces_[texel]);
+  const float inside = inside_[texel].share() * backFaces_[texel];
   return inside > kMostInside * samples ? samples : samples - inside;
 }
 
@@ -360,10 +423,11 @@ void GatherIntegrator::substituteInvalid() {
   std::vector<std::uint8_t> valid(map_.size());
   std::vector<std::uint8_t> wanting(map_.size());
   for (std::size_t t = 0; t < valid.size(); ++t) {
-    valid[t] = 2 * backFaces_[t] <= samplesOf_[t] ? 1 : 0;
+    const auto samples = static_cast<float>(samplesOf_[t]);
+    valid[t] = 2.0f * backFaces_[t] <= samples ? 1 : 0;
     // Of texels wholly inside only rays from inside see anything, and these must not bring the light out there to
     // texels that are partly in the open.
-    wanting[t] = 16 * backFaces_[t] < 15 * samplesOf_[t] ? 1 : 0;
+    wanting[t] = 16.0f * backFaces_[t] < 15.0f * samples ? 1 : 0;
   }
   substitutes_ = map_.substitutes(wanting, valid);
 }
@@ -372,7 +436,7 @@ void GatherIntegrator::findBuried() {
   std::vector<std::uint8_t> hidden(map_.size());
   std::vector<std::uint8_t> valid(map_.size());
   for (std::size_t t = 0; t < valid.size(); ++t) {
-    const double lead = 2.0 * backFaces_[t] - samplesOf_[t];  // of rays that meet backs
+    const double lead = 2.0 * static_cast<double>(backFaces_[t]) - samplesOf_[t];  // of rays that meet backs
     const bool certain = lead * lead >= kCertain * samplesOf_[t];
     hidden[t] = certain && lead > 0.0 ? 1 : 0;
     valid[t] = certain && lead < 0.0 ? 1 : 0;
@@ -451,7 +515,7 @@ double GatherIntegrator::markDone() {
     std::size_t metHere = 0;
     for (std::size_t i = 0; i < wave.count; ++i) {
       const std::size_t t = start + i;
-      const bool inside = options_.targetError > 0.0f && 2 * backFaces_[t] > samplesOf_[t];
+      const bool inside = options_.targetError > 0.0f && 2.0f * backFaces_[t] > static_cast<float>(samplesOf_[t]);
       metHere +=
           inside || worst * static_cast<double>(errorOf(w, i)) <= goal(static_cast<double>(luminance(meanLight(t))));
     }
@@ -483,7 +547,7 @@ BakedTexel GatherIntegrator::texel(std::uint32_t page, std::size_t index) const 
   BakedTexel baked;
   baked.coverage = coverage_[t];
   const auto taken = static_cast<float>(std::max(1u, samplesOf_[t]));
-  baked.validity = 1.0f - static_cast<float>(backFaces_[t]) / taken;
+  baked.validity = std::max(0.0f, 1.0f - backFaces_[t] / taken);
   baked.standardError = errorOf(firstWave_[page] + index / kLanes, index % kLanes);
   if (coverage_[t] > 0.0f) baked.samples = samplesOf_[t];
   baked.probed = index % PathIntegrator::kProbeStride == 0;

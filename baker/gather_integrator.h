@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "baker/doubling_error.h"
+#include "baker/gather_guide.h"
 #include "baker/gather_wave.h"
 #include "scene/expected.h"
 #include "scene/progress.h"
@@ -51,13 +52,16 @@ struct TexelLight {
   void resize(std::size_t count);
 };
 
-/// The links of the warm-up: 4 bytes each, and 8 more for those that pass on only a share.
+/// The links of the warm-up: 5 bytes each, and 8 more for those that pass on only a share.
 struct WarmLinks {
   struct Share {
     std::uint32_t link = 0;  // of the wave: texel * kWarmRays + ray
     std::uint32_t weight = 0;
   };
-  std::vector<std::uint32_t> texels;       // GatherWave::kWarmRays for each texel
+  // GatherWave::kWarmRays for each texel: the texel found (below kLight), or else the luminance seen, negated.
+  static constexpr std::uint32_t kLight = 0x80000000u;
+  std::vector<std::uint32_t> found;
+  std::vector<std::uint8_t> bins;
   std::vector<std::vector<Share>> shares;  // per wave, in order
 };
 
@@ -66,7 +70,8 @@ struct WarmLinks {
 ///
 /// 1. A direct map: kWarmLights light samples per texel.
 /// 2. Warm-up: kWarmRays rays per texel are traced once and kept as links to the texels that they hit; the light of
-///    one bounce after another is passed along them, without further rays.
+///    one bounce after another is passed along them, without further rays. Where what they find differs most, a wave
+///    and those around it send the rays of the next step.
 /// 3. Gather: passes of 8, 8, 16, 32, ... samples per texel that continue one sequence. After each the cache is what
 ///    all of them found so far.
 ///
@@ -117,7 +122,10 @@ class GatherIntegrator {
   };
   Expected<void> warmUp(Progress& progress);
   /// `light`: irradiance / pi to begin with; `constant`: what every sweep finds again, links apart.
-  void solveLinks(const WarmLinks& links, std::vector<Vec3> light, std::span<const Vec3> constant);
+  /// Returns what texels reflect in the end.
+  std::vector<PackedColor> solveLinks(const WarmLinks& links, std::vector<Vec3> light, std::span<const Vec3> constant);
+  GuideTally tallyOf(std::size_t wave, const WarmLinks& links, std::span<const PackedColor> reflected) const;
+  void makeGuides(const WarmLinks& links, std::span<const PackedColor> reflected);
   void makeCache();
   void makeSums();
   void dropCache();
@@ -162,8 +170,9 @@ class GatherIntegrator {
   std::vector<Vec3> direct_;
   std::vector<Vec3> seen_;
   std::vector<PackedColor> cache_;  // levels.count per texel
+  std::vector<Guide> guides_;       // of waves; empty: all are even
   std::vector<float> coverage_;
-  std::vector<std::uint32_t> backFaces_;
+  std::vector<float> backFaces_;         // rays, each by its stretch
   std::vector<std::uint8_t> buried_;     // nothing more is gathered for them
   std::vector<std::uint8_t> warmBacks_;  // bits of the warm-up's rays, until the first pass is done
   std::vector<InsideTally> inside_;

@@ -11,6 +11,7 @@ namespace lumel {
 namespace {
 
 constexpr float kLeastComponent = 1e-12f;
+constexpr float kBelowOne = 1.0f - 0x1p-24f;
 
 inline float awayFromZero(float component) {
   const float least = pick(component < 0.0f, -kLeastComponent, kLeastComponent);
@@ -41,10 +42,43 @@ inline float awayFromZero(float component) {
 
 }  // namespace
 
-LUMEL_FOR_EACH_CPU void aimGatherRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays) {
-  for (std::size_t lane = 0; lane < kLanes; ++lane)
-    rays.dirTangent.set(lane, sampleGatherHemisphere({x[lane], y[lane]}));
+GuidedPoints guidedPoints(const NetLanes& net, std::uint32_t cell) {
+  const int bitsX = (net.net().log2Count + 1) / 2, bitsY = net.net().log2Count / 2;
+  const NetCell at = netCell(cell);
+  return {.x = net.x(cell),
+          .y = net.y(cell),
+          .row = (at.x * kGuideRows) >> bitsX,
+          .column = (at.y * kGuideColumns) >> bitsY,
+          .columns = std::max(1u, kGuideColumns >> bitsY)};
+}
+
+LUMEL_FOR_EACH_CPU void aimGatherRays(const GuidedPoints& points, const GuideTable& guide, const PointLanes& from,
+                                      AimedRays& rays) {
+  const float x0 = guide.x0[points.row], dx = guide.dx[points.row];
+  const auto& rowY0 = guide.y0[points.row];
+  const auto& rowDy = guide.dy[points.row];
+  alignas(64) float y0[kLanes], dy[kLanes];
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    y0[lane] = rowY0[points.column];
+    dy[lane] = rowDy[points.column];
+  }
+  for (std::uint32_t column = points.column + 1; column < points.column + points.columns; ++column) {
+    const float start = static_cast<float>(column) / static_cast<float>(kGuideColumns);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const bool reaches = points.y[lane] >= start;
+      y0[lane] = pick(reaches, rowY0[column], y0[lane]);
+      dy[lane] = pick(reaches, rowDy[column], dy[lane]);
+    }
+  }
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    // Rounding must not lead out of the square.
+    const float x = within(x0 + dx * points.x[lane], 0.0f, kBelowOne);
+    const float y = within(y0[lane] + dy[lane] * points.y[lane], 0.0f, kBelowOne);
+    rays.stretch[lane] = dx * dy[lane];
+    rays.dirTangent.set(lane, sampleGatherHemisphere({x, y}));
+  }
   aim(from, rays);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) rays.weight[lane] = kInvPi * rays.stretch[lane] / rays.pdf[lane];
 }
 
 LUMEL_FOR_EACH_CPU void aimCosineRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays) {
@@ -87,7 +121,7 @@ LUMEL_FOR_EACH_CPU FoundTexels sortFound(const RayPacket& packet, const std::arr
 }
 
 LUMEL_FOR_EACH_CPU void lookUpLight(const FoundTexels& found, const PackedColor* radiance, std::uint32_t stride,
-                                    const float* pdf, Vec3Lanes& light) {
+                                    const float* weight, Vec3Lanes& light) {
   static_assert(sizeof(PackedColor) == 8);
   std::array<LaneWords, 2> columns;
   turnRows<2>([&](std::size_t lane) { return radiance + std::size_t{found.texels[lane]} * stride; }, columns);
@@ -95,7 +129,7 @@ LUMEL_FOR_EACH_CPU void lookUpLight(const FoundTexels& found, const PackedColor*
   std::memcpy(packed, &columns, sizeof packed);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const bool isLookedUp = (found.lookedUp & (1u << lane)) != 0;
-    const Vec3 arriving = kInvPi / pdf[lane] * unpackColor(packed[0][lane], packed[1][lane]);
+    const Vec3 arriving = weight[lane] * unpackColor(packed[0][lane], packed[1][lane]);
     light.set(lane, pick(isLookedUp, arriving, Vec3(0.0f)));
   }
 }

@@ -4,8 +4,10 @@
 #include <array>
 #include <cstdint>
 
+#include "baker/gather_guide.h"
 #include "baker/lanes.h"
 #include "baker/packed_color.h"
+#include "baker/stratified_net.h"
 #include "baker/wave_points.h"
 
 namespace lumel {
@@ -13,16 +15,30 @@ namespace lumel {
 /// The gather rays of a wave: each lane's goes out from its own point.
 struct AimedRays {
   Vec3Lanes dirTangent;
-  alignas(64) float pdf[kLanes] = {};  // density per solid angle
+  alignas(64) float pdf[kLanes] = {};      // the gather's density per solid angle, by which it is weighed with lights
+  alignas(64) float stretch[kLanes] = {};  // pdf over the density with which the ray was aimed
+  alignas(64) float weight[kLanes] = {};   // of the light that it finds: stretch / (pi pdf)
   RayPacket packet;
 };
 
-/// Aims by sampleGatherHemisphere at u = (x, y), kLanes values each. Lanes whose ray would go below the geometric
+/// The points of a net's cell, which lie in one row of a guide; from 2^kLeastGuided points on nets are so fine.
+struct GuidedPoints {
+  const float* x;  // kLanes values each
+  const float* y;
+  std::uint32_t row = 0;
+  std::uint32_t column = 0;   // the first that they lie in
+  std::uint32_t columns = 1;  // and how many there are
+};
+inline constexpr int kLeastGuided = 3;
+static_assert(kGuideRows == 4);
+GuidedPoints guidedPoints(const NetLanes& net, std::uint32_t cell);
+
+/// Aims by sampleGatherHemisphere where the guide leads the points. Lanes whose ray would go below the geometric
 /// surface, and those without a texel, are not valid: a bent shading normal gathers from there too, where nothing
 /// arrives. No component of a ray's direction is nearer to zero than 1e-12 (see TraceMode::Coherent).
-void aimGatherRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays);
+void aimGatherRays(const GuidedPoints& points, const GuideTable& guide, const PointLanes& from, AimedRays& rays);
 
-/// The same by the cosine; `pdf` is still the gather's, for the weight against light samples.
+/// The same by the cosine at u = (x, y), unguided; `pdf` is still the gather's, and there are no weights.
 void aimCosineRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays);
 
 /// How many rays of a traced packet found something else than the lane before theirs; 0 to kLanes - 1.
@@ -38,8 +54,8 @@ struct FoundTexels {
 /// `texels`: kNoTexel where there is none; `near`: bits of lanes that are not to be looked up.
 FoundTexels sortFound(const RayPacket& packet, const std::array<std::uint32_t, kLanes>& texels, std::uint32_t near);
 
-/// light = radiance[texel * stride] * kInvPi / pdf for the lanes that are looked up, else 0.
-void lookUpLight(const FoundTexels& found, const PackedColor* radiance, std::uint32_t stride, const float* pdf,
+/// light = radiance[texel * stride] * weight for the lanes that are looked up, else 0.
+void lookUpLight(const FoundTexels& found, const PackedColor* radiance, std::uint32_t stride, const float* weight,
                  Vec3Lanes& light);
 
 /// Sums of irradiance / pi over a few samples: of the flat map's three colours, then of those of the RNM maps.

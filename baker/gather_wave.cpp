@@ -19,15 +19,19 @@ constexpr std::uint32_t kLightStretch = kLightPatterns + 5;
 struct WarmSink {
   std::array<WarmTexel, kLanes>& texels;
   std::span<CacheLink> links;
+  bool indirectOnly;
 
+  CacheLink& linkOf(const Flight& flight) { return links[flight.lane * GatherWave::kWarmRays + flight.sample]; }
   void light(const Flight& flight, const Vec3& radiance, int depth) {
     WarmTexel& texel = texels[flight.lane];
     const Vec3 light = flight.beta * radiance;
     if (!isFinite(light)) return;
     (depth == 0 ? texel.seen : texel.relit) += light;
+    if (depth > 0 || !indirectOnly) linkOf(flight).light += luminance(light);
   }
   void texel(const Flight& flight, std::uint32_t texel) {
-    links[flight.lane * GatherWave::kWarmRays + flight.sample] = {texel, packWeight(flight.beta)};
+    linkOf(flight).texel = texel;
+    linkOf(flight).weight = packWeight(flight.beta);
   }
   void prefetch(std::uint32_t) const {}
   void backFace(const Flight& flight) { texels[flight.lane].backs |= 1u << flight.sample; }
@@ -47,7 +51,8 @@ struct GatherSink {
   MapTotals totals{};
   bool tallied = false;  // whether the gather rays are
   LightTally rays{};
-  std::size_t point = 0;                                                    // the footprint point that rays come from
+  std::size_t point = 0;  // the footprint point that the ray at hand comes from
+  float stretch = 1.0f;   // and its AimedRays::stretch
   std::array<std::array<std::uint8_t, WavePoints::kMost>, kLanes> backs{};  // rays of a net that met backs, by point
 
   /// Radiance that a texel reflects, by level.
@@ -128,7 +133,7 @@ struct GatherSink {
     passOnLevels(flight.lane, flight.dirTangent, flight.beta, texel, flight.depth);
   }
   void backFace(const Flight& flight) {
-    ++result.texels[flight.lane].backFaces;
+    result.texels[flight.lane].backFaces += stretch;
     ++backs[flight.lane][point];
   }
 
@@ -244,7 +249,7 @@ Flight GatherWave::flightOf(std::size_t lane, std::uint32_t sample, const PointL
           .sample = sample,
           .key = samplers_[lane].seedOf(kHits),
           .dirTangent = rays.dirTangent[lane],
-          .beta = Vec3(kInvPi / rays.pdf[lane]),
+          .beta = Vec3(rays.weight[lane]),
           .origin = from.p[lane],
           .pdf = rays.pdf[lane]};
 }
@@ -260,7 +265,7 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   }
   warmDirect(texels, counts);
 
-  WarmSink sink{texels, links};
+  WarmSink sink{texels, links, scene_.indirectOnly};
   GatherTracer tracer(scene_.transport, scene_.map, scene_.reflectance, scene_.lastDepth, sink);
   SampleLanes samples = lightSamples_;
   AimedRays& rays = packets_[0].rays;
@@ -272,6 +277,8 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
     aimCosineRays(u.x, u.y, from, rays);
     scene_.transport.rays.intersect(rays.packet, TraceMode::Packet);
     for (std::size_t lane = count_; lane < kLanes; ++lane) rays.packet.valid[lane] = 0;
+    for (std::size_t lane = 0; lane < count_; ++lane)
+      if (covered_[lane]) links[lane * kWarmRays + s].bin = guideBin(rays.dirTangent.z[lane], u.y[lane]);
     Flight flight;
     tracer.arriveAll(rays.packet, [&](int lane) -> const Flight& {
       const auto l = static_cast<std::size_t>(lane);
@@ -293,7 +300,8 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
 }
 
 GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
-                                std::span<const std::uint8_t> buried, std::span<LightSpread> spreads) {
+                                std::span<const std::uint8_t> buried, const Guide& guide,
+                                std::span<LightSpread> spreads) {
   GatheredWave result;
   GatherSink sink{scene_, cache, result, page_, std::span(scene_.texels[page_].coords).subspan(first_, count_)};
   for (std::size_t lane = 0; lane < count_; ++lane)
@@ -307,6 +315,7 @@ GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::spa
     const NetRange net = netAt(sample, end);
     if (!spreads.empty()) gatherLight(net, spreads, sink);
     points_.draw(samplers_, kFootprint, net.first, std::min(WavePoints::kMost, net.count()));
+    guide_ = GuideTable(net.log2Count >= kLeastGuided ? guide : Guide());
     sink.tallied = !spreads.empty() && isPilot(net.first);
     gatherRays(net, sink);
     if (sink.tallied) sink.rays.enter(spreads.back(), net.count(), coveredCount_);
@@ -420,7 +429,7 @@ static std::uint32_t pointOf(std::uint32_t cell) { return cell ^ ((cell >> 1) & 
 
 /// Sends the rays of all lanes into one cell of the net.
 void GatherWave::launch(Packet& packet) {
-  aimGatherRays(net_.x(packet.cell), net_.y(packet.cell), points_[pointOf(packet.cell)], packet.rays);
+  aimGatherRays(guidedPoints(net_, packet.cell), guide_, points_[pointOf(packet.cell)], packet.rays);
   scene_.transport.rays.intersect(packet.rays.packet, scene_.gatherMode.value_or(pilot_.mode()));
   pilot_.see(packet.rays.packet);
 }
@@ -447,16 +456,17 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
   sink.result.rays += static_cast<std::uint64_t>(std::popcount(found.lookedUp | found.others | found.missed));
   Vec3Lanes light;
   if (level >= 0)
-    lookUpLight(found, sink.cache.data() + level, static_cast<std::uint32_t>(scene_.levels.count), rays.pdf, light);
+    lookUpLight(found, sink.cache.data() + level, static_cast<std::uint32_t>(scene_.levels.count), rays.weight, light);
   if (!scene_.levels.endless)
     forEachLane(found.lookedUp, [&](std::size_t lane) {
-      sink.passOnLevels(lane, rays.dirTangent[lane], Vec3(kInvPi / rays.pdf[lane]), lookup.texels[lane], 0);
+      sink.passOnLevels(lane, rays.dirTangent[lane], Vec3(rays.weight[lane]), lookup.texels[lane], 0);
     });
   forEachLane(found.others, [&](std::size_t lane) {
     const Flight flight = flightOf(lane, net_.sample(packet.cell, lane), points_[pointOf(packet.cell)], rays);
     if ((lookup.others >> lane & 1u) == 0)
       return tracer.arriveNear(rays.packet, static_cast<int>(lane), flight, lookup.texels[lane]);
     sink.point = pointOf(packet.cell) % WavePoints::kMost;
+    sink.stretch = rays.stretch[lane];
     tracer.arrive(rays.packet, static_cast<int>(lane), flight, lookup);
   });
   if (found.missed != 0 && scene_.transport.environment.shines()) collectSky(rays, found.missed, light, sink);
@@ -471,7 +481,7 @@ void GatherWave::collectSky(const AimedRays& rays, std::uint32_t lanes, Vec3Lane
   Vec3Lanes sky;
   scene_.transport.environment.arriving(rays.packet.directions(), rays.pdf, sky);
   forEachLane(lanes, [&](std::size_t lane) {
-    const Vec3 arriving = kInvPi / rays.pdf[lane] * sky[lane];
+    const Vec3 arriving = rays.weight[lane] * sky[lane];
     const bool isSeen = isFinite(arriving) && scene_.indirectOnly;
     if (isSeen)
       sink.addSeen(lane, rays.dirTangent[lane], arriving);

@@ -34,9 +34,19 @@ LUMEL_FOR_EACH_CPU void drawNet(std::uint32_t seed, std::uint32_t count, int bit
 
 }  // namespace
 
+NetCell netCell(std::uint32_t cell) {
+  const auto even = [](std::uint32_t v) {
+    v &= 0x55555555u;
+    v = (v | (v >> 1)) & 0x33333333u;
+    v = (v | (v >> 2)) & 0x0f0f0f0fu;
+    return (v | (v >> 4)) & 0x00ff00ffu;
+  };
+  return {even(cell), even(cell >> 1)};
+}
+
 void NetLanes::fill(const std::array<TexelSampler, kLanes>& samplers, const std::array<bool, kLanes>& active,
                     const NetRange& net, std::uint32_t pattern) {
-  first_ = net.first;
+  net_ = net;
   RawNet raw;
   for (std::uint32_t i = 0; i < net.count(); ++i) raw.reversedIndex[i] = reverseBits(net.first + i);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {

@@ -30,6 +30,13 @@ inline NetRange netAt(std::uint32_t first, std::uint32_t end) {
   return {first, log2Count};
 }
 
+/// Place of a cell among 2^ceil(m/2) x 2^floor(m/2), m being the net's log2Count.
+struct NetCell {
+  std::uint32_t x = 0;
+  std::uint32_t y = 0;
+};
+NetCell netCell(std::uint32_t cell);
+
 /// The points of a net by cell, for every lane of a wave. An aligned block of 2^m points of a (0, 2)-sequence is a
 /// (0, m, 2)-net: each of 2^ceil(m/2) x 2^floor(m/2) cells holds exactly one of them (Niederreiter 1987; Owen
 /// scrambling keeps this). Cells are in Morton order, so that one packet's rays are close to those of the next.
@@ -43,10 +50,13 @@ class NetLanes {
   const float* x(std::uint32_t cell) const { return x_.data() + std::size_t{cell} * kLanes; }
   const float* y(std::uint32_t cell) const { return y_.data() + std::size_t{cell} * kLanes; }
   /// Index in the sequence.
-  std::uint32_t sample(std::uint32_t cell, std::size_t lane) const { return first_ + offset_[cell * kLanes + lane]; }
+  std::uint32_t sample(std::uint32_t cell, std::size_t lane) const {
+    return net_.first + offset_[cell * kLanes + lane];
+  }
+  const NetRange& net() const { return net_; }
 
  private:
-  std::uint32_t first_ = 0;
+  NetRange net_;
   // [cell][lane]; only what the net at hand needs is ever touched
   alignas(64) std::array<float, std::size_t{kMostNetPoints} * kLanes> x_;
   alignas(64) std::array<float, std::size_t{kMostNetPoints} * kLanes> y_;

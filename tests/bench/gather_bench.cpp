@@ -273,7 +273,7 @@ void compare(benchmark::State& state, int place, std::uint32_t samples, std::opt
     for (std::size_t t = first; t < first + kLanes; ++t) naiveSum += gatherNaively(f, t, samples).flat.x;
   };
   const auto gatherWave = [&](std::size_t first) {
-    const GatheredWave done = GatherWave(scene, 0, first, kLanes).gather(0, samples, f.cache, kOpen, {});
+    const GatheredWave done = GatherWave(scene, 0, first, kLanes).gather(0, samples, f.cache, kOpen, Guide(), {});
     for (const GatheredTexel& texel : done.texels) gatherSum += texel.flat.x;
     rays += static_cast<double>(done.rays);
   };
@@ -323,7 +323,7 @@ void gather(benchmark::State& state) {
     for (const std::size_t first : firsts) {
       GatherWave wave(f.scene, 0, first, kLanes);
       rays += static_cast<std::int64_t>(
-          wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache, kOpen, {}).rays);
+          wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache, kOpen, Guide(), {}).rays);
     }
   state.SetItemsProcessed(rays);
 }

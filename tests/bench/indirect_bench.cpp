@@ -4,6 +4,7 @@
 //   lumel_bench_gather --benchmark_filter=indirect/dark_room  the same, errors in the room without lamp
 // Indirect light alone is baked (BakeOptions::indirectOnly). All rays count that it takes: the gather's direct map and
 // warm-up, gather rays, paths, shadows. Errors are of luminance, relative: RMSE over texels by their mean.
+// Each is measured with kSeeds seeds, and their mean squared errors are averaged.
 // Truth: two path-traced references A and B that are independent of each other and of the candidate X, so that
 // mean((X - A)(X - B)) is X's mean squared error whatever the noise of A and B.
 #include <benchmark/benchmark.h>
@@ -26,6 +27,8 @@ struct Indirect {
   std::vector<double> light;  // luminance, per texel that counts
   double raysPerTexel = 0;    // over all texels
 };
+
+constexpr int kSeeds = 3;
 
 enum class Where { Cornell, EmptyBox, Rooms, DarkRoom };
 
@@ -110,20 +113,26 @@ void indirect(benchmark::State& state, Where where, int referenceSamples) {
     double noise = 0;
     for (std::size_t i = 0; i < a.light.size(); ++i) noise += std::pow(a.light[i] - b.light[i], 2) / 4;
     state.counters["reference_error"] = std::sqrt(noise / static_cast<double>(a.light.size())) / truth;
-    const auto judge = [&](const Indirect& x, const std::string& label) {
-      double sum = 0;
-      for (std::size_t i = 0; i < x.light.size(); ++i) sum += (x.light[i] - a.light[i]) * (x.light[i] - b.light[i]);
-      const double error = std::sqrt(std::max(0.0, sum / static_cast<double>(x.light.size()))) / truth;
+    const auto judge = [&](const std::string& label, auto measure) {
+      double sum = 0, light = 0, rays = 0;
+      for (std::uint64_t seed = 7; seed < 7 + kSeeds; ++seed) {
+        const Indirect x = measure(seed);
+        for (std::size_t i = 0; i < x.light.size(); ++i) sum += (x.light[i] - a.light[i]) * (x.light[i] - b.light[i]);
+        light += mean(x.light) / kSeeds;
+        rays += x.raysPerTexel / kSeeds;
+      }
+      const double error = std::sqrt(std::max(0.0, sum / static_cast<double>(kSeeds * a.light.size()))) / truth;
       state.counters[label + "_error"] = error;
-      state.counters[label + "_rays"] = x.raysPerTexel;
-      state.counters[label + "_bias"] = mean(x.light) / truth - 1;
-      return Point{x.raysPerTexel, error};
+      state.counters[label + "_rays"] = rays;
+      state.counters[label + "_bias"] = light / truth - 1;
+      return Point{rays, error};
     };
     const auto curveOf = [&](Integrator integrator, const char* name, std::initializer_list<int> counts,
                              bool denoise = false) {
       std::vector<Point> curve;
       for (const int samples : counts)
-        curve.push_back(judge(study.measure(integrator, samples, 7, denoise), name + std::to_string(samples)));
+        curve.push_back(judge(name + std::to_string(samples),
+                              [&](std::uint64_t seed) { return study.measure(integrator, samples, seed, denoise); }));
       return curve;
     };
     const std::vector<Point> path = curveOf(Integrator::Path, "path", {64, 256, 1024, 2048});
@@ -134,8 +143,9 @@ void indirect(benchmark::State& state, Where where, int referenceSamples) {
     // Rays where they are needed: more samples where texels are still far from the target.
     std::vector<Point> targeted;
     for (const int permille : {80, 40, 30, 20, 15})
-      targeted.push_back(judge(study.measure(Integrator::Gather, 32, 7, false, 0.001f * static_cast<float>(permille)),
-                               "target" + std::to_string(permille)));
+      targeted.push_back(judge("target" + std::to_string(permille), [&](std::uint64_t seed) {
+        return study.measure(Integrator::Gather, 32, seed, false, 0.001f * static_cast<float>(permille));
+      }));
     for (const int percent : {5, 2}) {
       const std::string label = std::to_string(percent) + "pct";
       state.counters["path_rays_" + label] = raysFor(0.01 * percent, path);
