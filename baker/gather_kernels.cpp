@@ -40,6 +40,24 @@ inline float awayFromZero(float component) {
   }
 }
 
+struct StretchedColumn {
+  float y0, dy;
+};
+
+/// `columnOf(y)`: of GuideTable.
+template <class ColumnOf>
+[[gnu::always_inline]] inline void aimStretched(const GuidedPoints& points, float x0, float dx, ColumnOf columnOf,
+                                                AimedRays& rays) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const StretchedColumn column = columnOf(points.y[lane]);
+    const float x = x0 + dx * points.x[lane];
+    const float y = column.y0 + column.dy * points.y[lane];
+    rays.stretch[lane] = dx * column.dy;
+    // Rounding must not lead to the horizon, where the density ends.
+    rays.dirTangent.set(lane, sampleGatherHemisphere({x < kBelowOne ? x : kBelowOne, y}));
+  }
+}
+
 }  // namespace
 
 GuidedPoints guidedPoints(const NetLanes& net, std::uint32_t cell) {
@@ -55,27 +73,22 @@ GuidedPoints guidedPoints(const NetLanes& net, std::uint32_t cell) {
 LUMEL_FOR_EACH_CPU void aimGatherRays(const GuidedPoints& points, const GuideTable& guide, const PointLanes& from,
                                       AimedRays& rays) {
   const float x0 = guide.x0[points.row], dx = guide.dx[points.row];
-  const auto& rowY0 = guide.y0[points.row];
-  const auto& rowDy = guide.dy[points.row];
-  alignas(64) float y0[kLanes], dy[kLanes];
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    y0[lane] = rowY0[points.column];
-    dy[lane] = rowDy[points.column];
-  }
-  for (std::uint32_t column = points.column + 1; column < points.column + points.columns; ++column) {
-    const float start = static_cast<float>(column) / static_cast<float>(kGuideColumns);
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      const bool reaches = points.y[lane] >= start;
-      y0[lane] = pick(reaches, rowY0[column], y0[lane]);
-      dy[lane] = pick(reaches, rowDy[column], dy[lane]);
-    }
-  }
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    // Rounding must not lead out of the square.
-    const float x = within(x0 + dx * points.x[lane], 0.0f, kBelowOne);
-    const float y = within(y0[lane] + dy[lane] * points.y[lane], 0.0f, kBelowOne);
-    rays.stretch[lane] = dx * dy[lane];
-    rays.dirTangent.set(lane, sampleGatherHemisphere({x, y}));
+  const auto& y0 = guide.y0[points.row];
+  const auto& dy = guide.dy[points.row];
+  if (points.columns == 1) {
+    const StretchedColumn column{y0[points.column], dy[points.column]};
+    aimStretched(
+        points, x0, dx, [column](float) { return column; }, rays);
+  } else {
+    const auto columnOf = [&](float y) {
+      StretchedColumn column{y0[points.column], dy[points.column]};
+      for (std::uint32_t c = points.column + 1; c < points.column + points.columns; ++c) {
+        const bool reaches = y >= static_cast<float>(c) / static_cast<float>(kGuideColumns);
+        column = {pick(reaches, y0[c], column.y0), pick(reaches, dy[c], column.dy)};
+      }
+      return column;
+    };
+    aimStretched(points, x0, dx, columnOf, rays);
   }
   aim(from, rays);
   for (std::size_t lane = 0; lane < kLanes; ++lane) rays.weight[lane] = kInvPi * rays.stretch[lane] / rays.pdf[lane];
