@@ -27,8 +27,12 @@ constexpr double kSettledInDark = 5.0;
 constexpr double kSettledFloor = 1e-3;
 /// Calibrated: 93 to 97% of texels lie within 1.96 standard errors.
 constexpr double kGatherCredit = 0.5;
-/// Endless light: the warm-up ends where another bounce adds less than this share, or after so many.
+/// Endless light: the warm-up ends where another bounce adds less than this share, or changes what all of them come to
+/// by less; or after so many. No more than kMostBeyond of the light is from bounces that were not followed, and none
+/// where each bounce has more than kSlowest of the light of the one before.
 constexpr double kSettled = 1e-4;
+constexpr double kMostBeyond = 0.05;
+constexpr double kSlowest = 0.98;
 constexpr int kMostSweeps = 256;
 /// Longest path through surfaces without texels, where bounces have no end of their own.
 constexpr int kLongestPath = 64;
@@ -72,13 +76,17 @@ class LinkReader {
       : found_(links.found.data() + first), share_(links.shares[wave].begin()), end_(links.shares[wave].end()) {}
 
   bool isTexel() const { return found_[at_] < WarmLinks::kLight; }
-  /// What the texel of the link passes on.
+  /// What the texel of the link passes on. Asks memory for what a later link will.
   Vec3 lightOf(std::span<const PackedColor> reflected) {
+    const std::uint32_t later = found_[at_ + kAhead];
+    __builtin_prefetch(reflected.data() + (later < WarmLinks::kLight ? later : 0u));
     const Vec3 light = unpackColor(reflected[found_[at_]]);
     return share_ != end_ && share_->link == at_ ? light * unpackWeight(share_++->weight) : light;
   }
   float seen() const { return -std::bit_cast<float>(found_[at_]); }
   void next() { ++at_; }
+
+  static constexpr std::uint32_t kAhead = 32;
 
  private:
   const std::uint32_t* found_;
@@ -223,7 +231,7 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   const std::size_t count = map_.size();
   WarmLinks links;
   LUMEL_CHECK(count < WarmLinks::kLight);
-  links.found.resize(count * GatherWave::kWarmRays);
+  links.found.resize(count * GatherWave::kWarmRays + LinkReader::kAhead);
   links.bins.resize(count * GatherWave::kWarmRays);
   links.shares.resize(waves_.size());
   std::vector<Vec3> first(count);     // light that needs no texel to be known: direct, and what rays see shine
@@ -272,19 +280,23 @@ std::vector<PackedColor> GatherIntegrator::solveLinks(const WarmLinks& links, st
   const std::size_t count = map_.size();
   // What links look up: one product instead of two values from all over the memory.
   std::vector<PackedColor> reflected(count);
-  const auto reflect = [&] {
+  // And `beyond` times more of what the sweep added.
+  const auto reflect = [&](float beyond) {
     for (const TexelMap::Substitute& s : substitutes_) light[s.texel] = light[s.source];
     parallelFor(count, kSweepGrain, [&](std::size_t first, std::size_t last) {
-      for (std::size_t t = first; t < last; ++t) reflected[t] = packColor(unpackColor(reflectance_[t]) * light[t]);
+      for (std::size_t t = first; t < last; ++t) {
+        const Vec3 now = unpackColor(reflectance_[t]) * light[t];
+        reflected[t] = packColor(now + beyond * glm::max(now - unpackColor(reflected[t]), Vec3(0.0f)));
+      }
     });
   };
   const auto keep = [&](int level) {
     for (std::size_t t = 0; t < count; ++t) cache_[t * stored() + static_cast<std::size_t>(level)] = reflected[t];
   };
-  reflect();
+  reflect(0.0f);
   if (!levels.endless && levels.base == 0) keep(0);
   const int sweeps = levels.endless ? kMostSweeps : levels.base + levels.count - 1;
-  double before = 0.0;
+  double before = 0.0, addedBefore = 0.0, limitBefore = 0.0;
   for (int sweep = 1; sweep <= sweeps; ++sweep) {
     std::vector<double> parts((waves_.size() + kWaveGrain - 1) / kWaveGrain);
     parallelFor(waves_.size(), kWaveGrain, [&](std::size_t first, std::size_t last) {
@@ -302,12 +314,20 @@ std::vector<PackedColor> GatherIntegrator::solveLinks(const WarmLinks& links, st
       }
       parts[first / kWaveGrain] = sum;
     });
-    reflect();
-    if (!levels.endless && sweep >= levels.base) keep(sweep - levels.base);
     double total = 0.0;
     for (const double part : parts) total += part;
-    if (levels.endless && total - before <= kSettled * total) break;
+    // In the end every sweep adds the same share of what the one before it did, and the rest is a geometric series.
+    const double added = total - before;
+    const double ratio = addedBefore > 0.0 ? std::clamp(added / addedBefore, 0.0, kSlowest) : kSlowest;
+    const double rest = added * ratio / (1.0 - ratio);
+    const bool known = rest <= kMostBeyond * total && std::abs(total + rest - limitBefore) <= kSettled * total;
+    const bool settled = levels.endless && (known || added <= kSettled * total);
+    reflect(settled && known ? static_cast<float>(ratio / (1.0 - ratio)) : 0.0f);
+    if (settled) break;
+    if (!levels.endless && sweep >= levels.base) keep(sweep - levels.base);
     before = total;
+    addedBefore = added;
+    limitBefore = total + rest;
   }
   return reflected;
 }
