@@ -40,23 +40,28 @@ inline float awayFromZero(float component) {
   }
 }
 
-struct StretchedColumn {
-  float y0, dy;
-};
-
-/// `columnOf(y)`: of GuideTable.
-template <class ColumnOf>
-[[gnu::always_inline]] inline void aimStretched(const GuidedPoints& points, float x0, float dx, ColumnOf columnOf,
-                                                AimedRays& rays) {
+/// `y0` and `dy`: of GuideTable, for each lane.
+template <class Column>
+[[gnu::always_inline]] inline void aimStretched(const GuidedPoints& points, float x0, float dx, const Column& y0,
+                                                const Column& dy, AimedRays& rays) {
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const StretchedColumn column = columnOf(points.y[lane]);
     const float x = x0 + dx * points.x[lane];
-    const float y = column.y0 + column.dy * points.y[lane];
-    rays.stretch[lane] = dx * column.dy;
+    const float y = y0[lane] + dy[lane] * points.y[lane];
+    rays.stretch[lane] = dx * dy[lane];
     // Rounding must not lead to the horizon, where the density ends.
     rays.dirTangent.set(lane, sampleGatherHemisphere({x < kBelowOne ? x : kBelowOne, y}));
   }
 }
+
+/// One value for all lanes.
+struct Same {
+  float value;
+  float operator[](std::size_t) const { return value; }
+};
+struct alignas(64) Each {
+  float value[kLanes];
+  float operator[](std::size_t lane) const { return value[lane]; }
+};
 
 }  // namespace
 
@@ -75,20 +80,23 @@ LUMEL_FOR_EACH_CPU void aimGatherRays(const GuidedPoints& points, const GuideTab
   const float x0 = guide.x0[points.row], dx = guide.dx[points.row];
   const auto& y0 = guide.y0[points.row];
   const auto& dy = guide.dy[points.row];
+  const std::uint32_t first = points.column;
   if (points.columns == 1) {
-    const StretchedColumn column{y0[points.column], dy[points.column]};
-    aimStretched(
-        points, x0, dx, [column](float) { return column; }, rays);
+    aimStretched(points, x0, dx, Same{y0[first]}, Same{dy[first]}, rays);
   } else {
-    const auto columnOf = [&](float y) {
-      StretchedColumn column{y0[points.column], dy[points.column]};
-      for (std::uint32_t c = points.column + 1; c < points.column + points.columns; ++c) {
-        const bool reaches = y >= static_cast<float>(c) / static_cast<float>(kGuideColumns);
-        column = {pick(reaches, y0[c], column.y0), pick(reaches, dy[c], column.dy)};
+    Each start, scale;
+    std::fill_n(start.value, kLanes, y0[first]);
+    std::fill_n(scale.value, kLanes, dy[first]);
+    for (std::uint32_t column = first + 1; column < first + points.columns; ++column) {
+      const float border = static_cast<float>(column) / static_cast<float>(kGuideColumns);
+      const float startHere = y0[column], scaleHere = dy[column];
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        const bool reaches = points.y[lane] >= border;
+        start.value[lane] = pick(reaches, startHere, start.value[lane]);
+        scale.value[lane] = pick(reaches, scaleHere, scale.value[lane]);
       }
-      return column;
-    };
-    aimStretched(points, x0, dx, columnOf, rays);
+    }
+    aimStretched(points, x0, dx, start, scale, rays);
   }
   aim(from, rays);
   for (std::size_t lane = 0; lane < kLanes; ++lane) rays.weight[lane] = kInvPi * rays.stretch[lane] / rays.pdf[lane];
