@@ -1,8 +1,7 @@
 // Rays that end on the texel cache: a ray stops at the first surface whose texel knows what it reflects. Where a hit
 // has no texel (a surface without lightmap, the back of a single-sided one) it is shaded on the spot: its direct light
-// is sampled and one ray goes on, until it meets a texel. So is the first hit of a ray that is no longer than its
-// texels are wide: in corners and at the feet of things one value for a whole texel would tell its neighbours the wrong
-// light.
+// is sampled and one ray goes on, until it meets a texel. So is a hit that is only a few texels away: in corners, in
+// gaps and at the feet of things one value for a whole texel would tell its neighbours the wrong light.
 #pragma once
 
 #include <algorithm>
@@ -18,6 +17,10 @@
 #include "baker/texel_cache.h"
 
 namespace lumel {
+
+/// Hits that are nearer than so many of their texels are shaded on the spot; those of gather rays may be told so from
+/// farther away.
+inline constexpr float kNearTexels = 1.5f;
 
 /// A ray on its way, and the gather ray that it belongs to.
 struct Flight {
@@ -45,11 +48,11 @@ class GatherTracer {
                int lastDepth, Sink& sink)
       : transport_(transport), map_(map), reflectance_(reflectance), lastDepth_(lastDepth), sink_(sink) {}
 
-  /// What the rays of a packet found; flightOf(lane) tells of each.
+  /// What the rays of a packet found, near or not; flightOf(lane) tells of each.
   template <class FlightOf>
   void arriveAll(const RayPacket& packet, FlightOf flightOf) {
     TexelMap::Lookup lookup;
-    map_.findAll(packet, lookup);
+    map_.findAll(packet, lookup, 0.0f);
     for (const std::uint32_t texel : lookup.texels)
       if (texel != kNoTexel) sink_.prefetch(texel);
     for (int lane = 0; lane < kLanes; ++lane)
@@ -72,10 +75,14 @@ class GatherTracer {
       if (part.firstEmitter >= 0) findEmission(packet, lane, flight);
     }
     if (flight.depth >= lastDepth_) return;
-    if (texel != kNoTexel && !behind)
+    const bool near = (lookup.near >> lane & 1u) != 0;
+    if (texel != kNoTexel && !behind && !near)
       sink_.texel(flight, texel);
     else
-      arriveNear(packet, lane, flight, texel);
+      leaveToShade(flight, packet, lane,
+                   reflectance_.empty() || texel == kNoTexel
+                       ? transport_.materials.albedo(transport_.rays.pointAt(packet, lane))
+                       : unpackColor(reflectance_[texel]));
   }
 
   /// In two steps: brings closer what shading the hit will read.
@@ -83,14 +90,6 @@ class GatherTracer {
   void expectSpot(const RayPacket& packet, int lane, std::uint32_t texel) const {
     transport_.rays.prefetchCorners(packet, lane);
     if (!reflectance_.empty() && texel != kNoTexel) __builtin_prefetch(&reflectance_[texel]);
-  }
-
-  /// Shades the hit on the spot, although it may have a texel.
-  void arriveNear(const RayPacket& packet, int lane, const Flight& flight, std::uint32_t texel) {
-    leaveToShade(flight, packet, lane,
-                 reflectance_.empty() || texel == kNoTexel
-                     ? transport_.materials.albedo(transport_.rays.pointAt(packet, lane))
-                     : unpackColor(reflectance_[texel]));
   }
 
   /// One step with what was left to be shaded on the spot, once it fills packets: these are traced, and what their rays
@@ -119,7 +118,8 @@ class GatherTracer {
   };
   enum class Stage { Idle, Traced, Placed, Found };
   static constexpr std::size_t kManySpots = 2 * kLanes;
-  static constexpr int kRouletteAfter = 4;
+  /// In gaps between things rays meet near hits again and again.
+  static constexpr int kRouletteAfter = 1;
   static constexpr std::uint32_t kDirection = kLightPatterns;
   static constexpr std::uint32_t kRoulette = kLightPatterns + 1;
 
@@ -157,15 +157,16 @@ class GatherTracer {
         if (spots_.size() >= kLanes) shade(kLanes);
         break;
       case Stage::Traced:
-        map_.findPixels(packet_, lookup_);
-        forEachLane(lookup_.others, [&](std::size_t lane) { expectSpot(packet_, static_cast<int>(lane)); });
+        map_.findPixels(packet_, lookup_, kNearTexels);
+        forEachLane(lookup_.others | lookup_.near,
+                    [&](std::size_t lane) { expectSpot(packet_, static_cast<int>(lane)); });
         stage_ = Stage::Placed;
         break;
       case Stage::Placed:
         map_.findTexels(lookup_);
         for (const std::uint32_t texel : lookup_.texels)
           if (texel != kNoTexel) sink_.prefetch(texel);
-        forEachLane(lookup_.others,
+        forEachLane(lookup_.others | lookup_.near,
                     [&](std::size_t lane) { expectSpot(packet_, static_cast<int>(lane), lookup_.texels[lane]); });
         stage_ = Stage::Found;
         break;

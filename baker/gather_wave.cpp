@@ -299,6 +299,13 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   return texels;
 }
 
+/// A texel nearer than this fills as much of the hemisphere as four of so many rays: the next ones would look up its one
+/// value again and again, and what that lacks would stay while noise falls.
+static float nearTexelsAfter(std::uint32_t samples) {
+  constexpr float kMost = 5.0f;  // more makes bakes to a small target slower and hardly better
+  return std::clamp(0.2f * std::sqrt(static_cast<float>(samples)), kNearTexels, kMost);
+}
+
 GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
                                 std::span<const std::uint8_t> buried, const Guide& guide,
                                 std::span<LightSpread> spreads) {
@@ -309,6 +316,7 @@ GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::spa
   for (std::size_t lane = 0; lane < count_; ++lane) covered_[lane] = points_.covered(lane);
   coveredCount_ = static_cast<std::size_t>(std::count(covered_.begin(), covered_.end(), true));
   if (coveredCount_ == 0) return result;
+  nearTexels_ = nearTexelsAfter(first);
   for (std::size_t lane = 0; lane < count_; ++lane)
     if ((first_ + lane) % PathIntegrator::kProbeStride == 0) sink.probedLane = lane;
   for (std::uint32_t sample = first; sample < end;) {
@@ -411,7 +419,7 @@ void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
       if ((packet(3).cell & 15u) == 15u) settle(sink.sums, sink.totals);
     }
     if (inFlight(2)) scene_.map.findTexels(packet(2).lookup);
-    if (inFlight(1)) scene_.map.findPixels(packet(1).rays.packet, packet(1).lookup);
+    if (inFlight(1)) scene_.map.findPixels(packet(1).rays.packet, packet(1).lookup, nearTexels_);
     if (inFlight(0)) scene_.map.findTriangles(packet(0).rays.packet, packet(0).lookup);
     if (inFlight(1)) expectSpots(packet(1), tracer);
     if (inFlight(2)) expectLight(packet(2), tracer, sink);
@@ -463,8 +471,6 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
     });
   forEachLane(found.others, [&](std::size_t lane) {
     const Flight flight = flightOf(lane, net_.sample(packet.cell, lane), points_[pointOf(packet.cell)], rays);
-    if ((lookup.others >> lane & 1u) == 0)
-      return tracer.arriveNear(rays.packet, static_cast<int>(lane), flight, lookup.texels[lane]);
     sink.point = pointOf(packet.cell) % WavePoints::kMost;
     sink.stretch = rays.stretch[lane];
     tracer.arrive(rays.packet, static_cast<int>(lane), flight, lookup);

@@ -167,6 +167,7 @@ class GatherWave {
   SampleLanes lightSamples_;
   std::vector<LightTally> lightTallies_;  // of the strategies
   NetLanes net_;
+  float nearTexels_ = 0.0f;  // hits nearer than so many of their texels are shaded on the spot
   CoherencePilot pilot_;
   static constexpr std::uint32_t kInFlight = 4;
   std::array<Packet, kInFlight> packets_;

@@ -192,7 +192,7 @@ void TexelMap::findTriangles(const RayPacket& packet, Lookup& lookup) const {
 }
 
 LUMEL_FOR_EACH_CPU void TexelMap::placePixels(const RayPacket& packet, const Triangle* triangles,
-                                              std::uint32_t tilesAcross, Lookup& lookup) {
+                                              std::uint32_t tilesAcross, float nearTexels, Lookup& lookup) {
   std::array<LaneWords, 8> columns;
   turnRows<8>([&](std::size_t lane) { return triangles + lookup.triangles[lane]; }, columns);
   alignas(64) float of[8][kLanes];  // Triangle's members in order
@@ -211,10 +211,11 @@ LUMEL_FOR_EACH_CPU void TexelMap::placePixels(const RayPacket& packet, const Tri
     lookup.x[lane] = x;
     lookup.y[lane] = y;
     const bool isHit = (packet.valid[lane] != 0) & (packet.rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID);
-    const bool isNear = packet.rayhit.ray.tfar[lane] < Lookup::kNearTexels * of[7][lane];
+    const bool shines = of[7][lane] == kShines;
+    const bool isNear = !shines & (packet.rayhit.ray.tfar[lane] < nearTexels * of[7][lane]);
     const std::uint32_t bit = 1u << lane;
     hits |= isHit ? bit : 0u;
-    others |= !isFound | (of[7][lane] == kShines) ? bit : 0u;
+    others |= !isFound | shines ? bit : 0u;
     near |= isNear ? bit : 0u;
     lookup.bits[lane] = tileBit(column, row);
     lookup.tiles[lane] = firstTile[lane] + row / 4 * tilesAcross + column / 4;
@@ -224,9 +225,9 @@ LUMEL_FOR_EACH_CPU void TexelMap::placePixels(const RayPacket& packet, const Tri
   lookup.near = near & hits;
 }
 
-void TexelMap::findPixels(const RayPacket& packet, Lookup& lookup) const {
+void TexelMap::findPixels(const RayPacket& packet, Lookup& lookup, float nearTexels) const {
   static_assert(sizeof(Triangle) == 32 && offsetof(Triangle, firstTile) == 24 && offsetof(Triangle, texelMeters) == 28);
-  placePixels(packet, triangles_.data(), tilesAcross_, lookup);
+  placePixels(packet, triangles_.data(), tilesAcross_, nearTexels, lookup);
   for (const std::uint32_t tile : lookup.tiles) __builtin_prefetch(tiles_.data() + tile);
 }
 

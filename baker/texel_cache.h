@@ -31,12 +31,12 @@ class TexelMap {
   /// a caller can do other work in between.
   struct Lookup;
   void findTriangles(const RayPacket& packet, Lookup& lookup) const;
-  void findPixels(const RayPacket& packet, Lookup& lookup) const;
+  void findPixels(const RayPacket& packet, Lookup& lookup, float nearTexels) const;
   void findTexels(Lookup& lookup) const;
   /// All three, where there is no other work: the lanes at least wait for memory together.
-  void findAll(const RayPacket& packet, Lookup& lookup) const {
+  void findAll(const RayPacket& packet, Lookup& lookup, float nearTexels) const {
     findTriangles(packet, lookup);
-    findPixels(packet, lookup);
+    findPixels(packet, lookup, nearTexels);
     findTexels(lookup);
   }
 
@@ -80,7 +80,7 @@ class TexelMap {
   void addSurface(std::uint32_t part, const Surface& surface);
   static void chooseTriangles(const RayPacket& packet, const PartMap* parts, Lookup& lookup);
   static void placePixels(const RayPacket& packet, const Triangle* triangles, std::uint32_t tilesAcross,
-                          Lookup& lookup);
+                          float nearTexels, Lookup& lookup);
   static bool countTexels(const Tile* tiles, Lookup& lookup);
   const PageMap& pageOf(const Triangle& triangle) const;
   bool fromBehind(std::uint32_t part, const RayPacket& packet, int lane) const;
@@ -112,8 +112,7 @@ struct TexelMap::Lookup {
   // Bits of lanes:
   std::uint32_t behind;  // the hit is on the back
   std::uint32_t others;  // the texel does not tell all: a back, something that shines by itself, or no texel at all
-  std::uint32_t near;    // the ray is shorter than kNearTexels texels of what it hit: one value is too coarse
-  static constexpr float kNearTexels = 1.5f;
+  std::uint32_t near;    // not shining, and the ray is shorter than `nearTexels` texels of it: one value is too coarse
 
  private:
   friend TexelMap;

@@ -59,7 +59,7 @@ void expectTexelsUnderHits(bool placedByEmbree) {
     }
     mapped.rays->intersect(packet, TraceMode::Packet);
     TexelMap::Lookup lookup;
-    mapped.map->findAll(packet, lookup);
+    mapped.map->findAll(packet, lookup, 0.0f);
     for (int lane = 0; lane < kLanes; ++lane) {
       const std::uint32_t found = lookup.texels[static_cast<std::size_t>(lane)];
       std::uint32_t expected = kNoTexel;
