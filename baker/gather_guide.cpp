@@ -7,9 +7,9 @@ namespace lumel {
 namespace {
 
 /// Share of the rays that all directions get alike: what a few rays tell of a bin may be wrong.
-constexpr double kEven = 0.15;
+constexpr double kEven = 0.1;
 /// Every bin is judged as if so many more rays had differed by as much as rays do on average.
-constexpr double kPrior = 0.5;
+constexpr double kPrior = 0.25;
 /// Shares are interpolated between the middles of bins, in steps of a kFine-th of a bin.
 constexpr std::size_t kFine = 4;
 

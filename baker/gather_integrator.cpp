@@ -352,6 +352,11 @@ void GatherIntegrator::makeGuides(const WarmLinks& links, std::span<const Packed
   parallelFor(waves_.size(), kWaveGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t w = first; w < last; ++w) tallies[w] = tallyOf(w, links, reflected);
   });
+  const auto chartOf = [&](const Wave& wave) {
+    const PageTexels& page = scene_.texels[wave.page];
+    const TriangleRef& ref = page.triangles[page.firstTriangle[wave.first + wave.count / 2]];
+    return scene_.atlas.surfaces[ref.surface].charts[ref.triangle];
+  };
   const GuideMaker maker(scene_.kernels);
   guides_.resize(waves_.size());
   parallelFor(waves_.size(), kWaveGrain, [&](std::size_t first, std::size_t last) {
@@ -360,7 +365,8 @@ void GatherIntegrator::makeGuides(const WarmLinks& links, std::span<const Packed
       if (std::ranges::any_of(std::span(warmBacks_).subspan(start, waves_[w].count), meetsBacks)) continue;
       GuideTally around = tallies[w];  // counts twice
       for (const std::uint32_t near : errors_->around(w))
-        if (near != DoublingError::kNone) around.add(tallies[near], 1.0f);
+        if (near != DoublingError::kNone && chartOf(waves_[near]) == chartOf(waves_[w]))
+          around.add(tallies[near], 1.0f);
       guides_[w] = maker.make(around);
     }
   });

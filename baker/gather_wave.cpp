@@ -299,11 +299,12 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   return texels;
 }
 
-/// A texel nearer than this fills as much of the hemisphere as four of so many rays: the next ones would look up its one
-/// value again and again, and what that lacks would stay while noise falls.
+/// A texel nearer than this fills as much of the hemisphere as four of so many rays: the next ones would look up its
+/// one value again and again, and what that lacks would stay while noise falls. Of fewer samples noise hides it.
 static float nearTexelsAfter(std::uint32_t samples) {
+  constexpr std::uint32_t kFew = 512;
   constexpr float kMost = 5.0f;  // more makes bakes to a small target slower and hardly better
-  return std::clamp(0.2f * std::sqrt(static_cast<float>(samples)), kNearTexels, kMost);
+  return samples < kFew ? kNearTexels : std::min(0.2f * std::sqrt(static_cast<float>(samples)), kMost);
 }
 
 GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
