@@ -97,13 +97,13 @@ class GatherTracer {
   void advance() {
     do {
       step();
-    } while (spots_.size() >= kManySpots);
+    } while (waiting_ >= kManySpots);
   }
   /// Follows all.
   void finish() {
-    while (stage_ != Stage::Idle || spots_.size() >= kLanes) step();
-    while (!spots_.empty()) {
-      shade(std::min<std::size_t>(kLanes, spots_.size()));
+    while (stage_ != Stage::Idle || waiting_ >= kLanes) step();
+    while (waiting_ > 0) {
+      shade(std::min<std::size_t>(kLanes, waiting_));
       while (stage_ != Stage::Idle) step();
     }
   }
@@ -145,7 +145,8 @@ class GatherTracer {
       beta /= survival;
     }
     // Made in its place: a copy would wait for what was just written.
-    Spot& spot = spots_.emplace_back();
+    if (waiting_ == spots_.size()) spots_.resize(2 * spots_.size() + kManySpots);
+    Spot& spot = spots_[waiting_++];
     spot.flight = flight;
     spot.flight.beta = beta;
     transport_.rays.cornersAt(packet, lane, spot.hit);
@@ -154,7 +155,7 @@ class GatherTracer {
   void step() {
     switch (stage_) {
       case Stage::Idle:
-        if (spots_.size() >= kLanes) shade(kLanes);
+        if (waiting_ >= kLanes) shade(kLanes);
         break;
       case Stage::Traced:
         map_.findPixels(packet_, lookup_, kNearTexels);
@@ -184,7 +185,7 @@ class GatherTracer {
     SampleLanes samples;
     std::array<std::uint32_t, kLanes> keys{}, depths{};
     for (std::size_t lane = 0; lane < count; ++lane) {
-      const Spot& spot = spots_[spots_.size() - count + lane];
+      const Spot& spot = spots_[waiting_ - count + lane];
       transport_.rays.set(hits, lane, spot.hit);
       flights_[lane] = spot.flight;
       keys[lane] = spot.flight.key;
@@ -192,7 +193,7 @@ class GatherTracer {
       samples.setSample(static_cast<int>(lane), spot.flight.sample);
     }
     samples.setTexels(keys.data(), depths.data());  // as samplerAt
-    spots_.resize(spots_.size() - count);
+    waiting_ -= count;
     Vec3Lanes p, ng, ns, rayStart;
     receiveAt(hits, p, ng, ns, rayStart);
     const ReceiverLanes receivers{hits.active, p, ng, ns, rayStart};
@@ -221,7 +222,8 @@ class GatherTracer {
   const std::span<const PackedColor> reflectance_;
   const int lastDepth_;
   Sink& sink_;
-  std::vector<Spot> spots_;
+  std::vector<Spot> spots_;  // the first `waiting_` are left to be shaded; places are used again as they are
+  std::size_t waiting_ = 0;
   // Rays that go on, and what is known of where they ended.
   Stage stage_ = Stage::Idle;
   RayPacket packet_;
