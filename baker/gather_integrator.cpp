@@ -28,10 +28,11 @@ constexpr double kSettledFloor = 1e-3;
 /// Calibrated: 93 to 97% of texels lie within 1.96 standard errors.
 constexpr double kGatherCredit = 0.5;
 /// Endless light: the warm-up ends where another bounce adds less than this share, or changes what all of them come to
-/// by less; or after so many. No more than kMostBeyond of the light is from bounces that were not followed, and none
-/// where each bounce has more than kSlowest of the light of the one before.
+/// by less; or after so many. No more than kMostBeyond of the light is from bounces that were not followed, since rooms
+/// that are lit through others get theirs late; and none where each bounce has more than kSlowest of the light of the
+/// one before.
 constexpr double kSettled = 1e-4;
-constexpr double kMostBeyond = 0.05;
+constexpr double kMostBeyond = 0.002;
 constexpr double kSlowest = 0.98;
 constexpr int kMostSweeps = 256;
 /// Longest path through surfaces without texels, where bounces have no end of their own.
