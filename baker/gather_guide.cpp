@@ -99,11 +99,11 @@ void GuideTally::add(std::uint32_t bin, float luminance) {
   squares[bin] += luminance * luminance;
 }
 
-void GuideTally::add(const GuideTally& other, float weight) {
+void GuideTally::add(const GuideTally& other) {
   for (std::size_t b = 0; b < kGuideBins; ++b) {
-    rays[b] += weight * other.rays[b];
-    light[b] += weight * other.light[b];
-    squares[b] += weight * other.squares[b];
+    rays[b] += other.rays[b];
+    light[b] += other.light[b];
+    squares[b] += other.squares[b];
   }
 }
 

@@ -33,7 +33,7 @@ struct GuideTally {
   std::array<float, kGuideBins> squares{};
 
   void add(std::uint32_t bin, float luminance);
-  void add(const GuideTally& other, float weight);
+  void add(const GuideTally& other);
 };
 
 /// A map of the unit square onto itself, from where points are drawn to where directions are taken: rows of equal

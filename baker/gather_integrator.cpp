@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "baker/flush_denormals.h"
-#include "scene/check.h"
 #include "scene/parallel.h"
 #include "scene/stopwatch.h"
 
@@ -57,43 +56,6 @@ CacheLevels levelsFor(int bounces) {
   const int count = std::min(bounces, CacheLevels::kMost);
   return {.count = count, .base = bounces - count, .endless = false};
 }
-
-/// Enters a wave's links, from link `first` on.
-void keepLinks(std::span<const CacheLink> found, std::size_t wave, std::size_t first, WarmLinks& links) {
-  static const std::uint32_t whole = packWeight(Vec3(1.0f));
-  for (std::uint32_t i = 0; i < found.size(); ++i) {
-    const CacheLink& link = found[i];
-    const bool isTexel = link.texel != kNoTexel;
-    links.found[first + i] = isTexel ? link.texel : std::bit_cast<std::uint32_t>(-link.light);
-    links.bins[first + i] = static_cast<std::uint8_t>(link.bin);
-    if (isTexel && link.weight != whole) links.shares[wave].push_back({i, link.weight});
-  }
-}
-
-/// The links of a wave one by one.
-class LinkReader {
- public:
-  LinkReader(const WarmLinks& links, std::size_t wave, std::size_t first)
-      : found_(links.found.data() + first), share_(links.shares[wave].begin()), end_(links.shares[wave].end()) {}
-
-  bool isTexel() const { return found_[at_] < WarmLinks::kLight; }
-  /// What the texel of the link passes on. Asks memory for what a later link will.
-  Vec3 lightOf(std::span<const PackedColor> reflected) {
-    const std::uint32_t later = found_[at_ + kAhead];
-    __builtin_prefetch(reflected.data() + (later < WarmLinks::kLight ? later : 0u));
-    const Vec3 light = unpackColor(reflected[found_[at_]]);
-    return share_ != end_ && share_->link == at_ ? light * unpackWeight(share_++->weight) : light;
-  }
-  float seen() const { return -std::bit_cast<float>(found_[at_]); }
-  void next() { ++at_; }
-
-  static constexpr std::uint32_t kAhead = 32;
-
- private:
-  const std::uint32_t* found_;
-  std::vector<WarmLinks::Share>::const_iterator share_, end_;
-  std::uint32_t at_ = 0;
-};
 
 }  // namespace
 
@@ -230,11 +192,7 @@ Expected<void> GatherIntegrator::run(Progress& progress) {
 
 Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   const std::size_t count = map_.size();
-  WarmLinks links;
-  LUMEL_CHECK(count < WarmLinks::kLight);
-  links.found.resize(count * GatherWave::kWarmRays + LinkReader::kAhead);
-  links.bins.resize(count * GatherWave::kWarmRays);
-  links.shares.resize(waves_.size());
+  WarmLinks links(count, waves_.size());
   std::vector<Vec3> first(count);     // light that needs no texel to be known: direct, and what rays see shine
   std::vector<Vec3> constant(count);  // the same and light from hits without texels
   auto traced = forEachWave(progress, [&](std::size_t w) {
@@ -245,7 +203,7 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
     GatherWave texels(scene_, wave.page, wave.first, wave.count);
     std::array<CacheLink, std::size_t{kLanes} * GatherWave::kWarmRays> found;
     const auto warm = texels.warmUp(std::span(found).first(linkCount), counts);
-    keepLinks(std::span(found).first(linkCount), w, start * GatherWave::kWarmRays, links);
+    links.keep(w, start * GatherWave::kWarmRays, std::span(found).first(linkCount));
     for (std::size_t i = 0; i < wave.count; ++i) {
       reflectance_[start + i] = packColor(warm[i].reflectance);
       first[start + i] = warm[i].direct + warm[i].seen;
@@ -286,8 +244,9 @@ std::vector<PackedColor> GatherIntegrator::solveLinks(const WarmLinks& links, st
     for (const TexelMap::Substitute& s : substitutes_) light[s.texel] = light[s.source];
     parallelFor(count, kSweepGrain, [&](std::size_t first, std::size_t last) {
       for (std::size_t t = first; t < last; ++t) {
-        const Vec3 now = unpackColor(reflectance_[t]) * light[t];
-        reflected[t] = packColor(now + beyond * glm::max(now - unpackColor(reflected[t]), Vec3(0.0f)));
+        Vec3 now = unpackColor(reflectance_[t]) * light[t];
+        if (beyond > 0.0f) now += beyond * glm::max(now - unpackColor(reflected[t]), Vec3(0.0f));
+        reflected[t] = packColor(now);
       }
     });
   };
@@ -304,7 +263,7 @@ std::vector<PackedColor> GatherIntegrator::solveLinks(const WarmLinks& links, st
       double sum = 0.0;
       for (std::size_t w = first; w < last; ++w) {
         const std::size_t start = map_.firstOfPage(waves_[w].page) + waves_[w].first;
-        LinkReader link(links, w, start * GatherWave::kWarmRays);
+        WarmLinks::Reader link(links, w, start * GatherWave::kWarmRays);
         for (std::size_t t = start; t < start + waves_[w].count; ++t) {
           Vec3 found(0.0f);
           for (int ray = 0; ray < GatherWave::kWarmRays; ++ray, link.next())
@@ -338,10 +297,10 @@ GuideTally GatherIntegrator::tallyOf(std::size_t wave, const WarmLinks& links,
   const std::size_t first = (map_.firstOfPage(waves_[wave].page) + waves_[wave].first) * GatherWave::kWarmRays;
   const std::size_t end = first + std::size_t{waves_[wave].count} * GatherWave::kWarmRays;
   GuideTally tally;
-  LinkReader link(links, wave, first);
+  WarmLinks::Reader link(links, wave, first);
   for (std::size_t i = first; i < end; ++i, link.next()) {
     const float light = link.isTexel() ? luminance(link.lightOf(reflected)) : link.seen();
-    if (links.bins[i] < kGuideBins) tally.add(links.bins[i], light);
+    if (link.bin() < kGuideBins) tally.add(link.bin(), light);
   }
   return tally;
 }
@@ -366,8 +325,7 @@ void GatherIntegrator::makeGuides(const WarmLinks& links, std::span<const Packed
       if (std::ranges::any_of(std::span(warmBacks_).subspan(start, waves_[w].count), meetsBacks)) continue;
       GuideTally around = tallies[w];  // counts twice
       for (const std::uint32_t near : errors_->around(w))
-        if (near != DoublingError::kNone && chartOf(waves_[near]) == chartOf(waves_[w]))
-          around.add(tallies[near], 1.0f);
+        if (near != DoublingError::kNone && chartOf(waves_[near]) == chartOf(waves_[w])) around.add(tallies[near]);
       guides_[w] = maker.make(around);
     }
   });

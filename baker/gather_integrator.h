@@ -12,6 +12,7 @@
 #include "baker/doubling_error.h"
 #include "baker/gather_guide.h"
 #include "baker/gather_wave.h"
+#include "baker/warm_links.h"
 #include "scene/expected.h"
 #include "scene/progress.h"
 
@@ -50,19 +51,6 @@ struct TexelLight {
   std::array<std::vector<Vec3>, 3> rnm;
 
   void resize(std::size_t count);
-};
-
-/// The links of the warm-up: 5 bytes each, and 8 more for those that pass on only a share.
-struct WarmLinks {
-  struct Share {
-    std::uint32_t link = 0;  // of the wave: texel * kWarmRays + ray
-    std::uint32_t weight = 0;
-  };
-  // GatherWave::kWarmRays for each texel: the texel found (below kLight), or else the luminance seen, negated.
-  static constexpr std::uint32_t kLight = 0x80000000u;
-  std::vector<std::uint32_t> found;
-  std::vector<std::uint8_t> bins;
-  std::vector<std::vector<Share>> shares;  // per wave, in order
 };
 
 /// The light of all texels of an atlas. Every pass reads the cache that the passes before it left, and the cache is

@@ -324,9 +324,8 @@ GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::spa
     const NetRange net = netAt(sample, end);
     if (!spreads.empty()) gatherLight(net, spreads, sink);
     points_.draw(samplers_, kFootprint, net.first, std::min(WavePoints::kMost, net.count()));
-    guide_ = GuideTable(net.log2Count >= kLeastGuided ? guide : Guide());
     sink.tallied = !spreads.empty() && isPilot(net.first);
-    gatherRays(net, sink);
+    gatherRays(net, guide, sink);
     if (sink.tallied) sink.rays.enter(spreads.back(), net.count(), coveredCount_);
     sink.rays = {};
     sample += net.count();
@@ -400,7 +399,8 @@ void GatherWave::sampleStrategy(std::size_t strategy, std::uint32_t first, std::
   settle(sink.sums, sink.totals);
 }
 
-void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
+void GatherWave::gatherRays(const NetRange& net, const Guide& guide, GatherSink& sink) {
+  const GuideTable table(net.log2Count >= kLeastGuided ? guide : Guide());
   net_.fill(samplers_, covered_, net, kDirection);
   GatherTracer tracer(scene_.transport, scene_.map, scene_.reflectance, scene_.lastDepth, sink);
   const std::uint32_t count = net.count();
@@ -411,7 +411,7 @@ void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
     const auto inFlight = [&](std::uint32_t age) { return step >= age && step - age < count; };
     if (inFlight(0)) {
       packet(0).cell = step;
-      launch(packet(0));
+      launch(table, packet(0));
     }
     if (inFlight(3)) {
       collect(packet(3), tracer, sink);
@@ -437,8 +437,8 @@ void GatherWave::gatherRays(const NetRange& net, GatherSink& sink) {
 static std::uint32_t pointOf(std::uint32_t cell) { return cell ^ ((cell >> 1) & 8u); }
 
 /// Sends the rays of all lanes into one cell of the net.
-void GatherWave::launch(Packet& packet) {
-  aimGatherRays(guidedPoints(net_, packet.cell), guide_, points_[pointOf(packet.cell)], packet.rays);
+void GatherWave::launch(const GuideTable& guide, Packet& packet) {
+  aimGatherRays(guidedPoints(net_, packet.cell), guide, points_[pointOf(packet.cell)], packet.rays);
   scene_.transport.rays.intersect(packet.rays.packet, scene_.gatherMode.value_or(pilot_.mode()));
   pilot_.see(packet.rays.packet);
 }

@@ -127,9 +127,8 @@ class GatherWave {
 
   /// Samples [first, end) of every covered texel. `cache`: levels.count values per texel of the map, the radiance
   /// that the texel reflects. `buried`: one per texel of the wave; nothing is gathered for those. `guide`: leads the
-  /// gather rays, the same in all passes. `spreads`: what the
-  /// wave remembers of its light from pass to pass: of each of GatherScene::strategies, and last of the gather rays;
-  /// empty without strategies.
+  /// gather rays, the same in all passes. `spreads`: what the wave remembers of its light from pass to pass: of each of
+  /// GatherScene::strategies, and last of the gather rays; empty without strategies.
   GatheredWave gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
                       std::span<const std::uint8_t> buried, const Guide& guide, std::span<LightSpread> spreads);
 
@@ -143,14 +142,14 @@ class GatherWave {
   void gatherLight(const NetRange& net, std::span<LightSpread> spreads, GatherSink& sink);
   void sampleStrategy(std::size_t strategy, std::uint32_t first, std::uint32_t end, float weight, bool pilot,
                       GatherSink& sink);
-  void gatherRays(const NetRange& net, GatherSink& sink);
+  void gatherRays(const NetRange& net, const Guide& guide, GatherSink& sink);
   /// A packet of gather rays, from its start to where the light of its texels is known.
   struct Packet {
     std::uint32_t cell = 0;  // of the net
     AimedRays rays;
     TexelMap::Lookup lookup;
   };
-  void launch(Packet& packet);
+  void launch(const GuideTable& guide, Packet& packet);
   static void expectSpots(const Packet& packet, const GatherTracer<GatherSink>& tracer);
   static void expectLight(const Packet& packet, const GatherTracer<GatherSink>& tracer, const GatherSink& sink);
   void collect(const Packet& packet, GatherTracer<GatherSink>& tracer, GatherSink& sink) const;
@@ -171,7 +170,6 @@ class GatherWave {
   CoherencePilot pilot_;
   static constexpr std::uint32_t kInFlight = 4;
   std::array<Packet, kInFlight> packets_;
-  GuideTable guide_{Guide()};
 };
 
 }  // namespace lumel
