@@ -127,7 +127,8 @@ float DoublingError::standardError(std::size_t index, std::size_t i) const {
   const Run& run = runs_[index];
   if (run.doublings == 0) return 0.0f;
   const auto own = static_cast<double>(sums_[run.first + i]);
-  const double moved = own < 0.0 ? run.pool : (own + kPrior * run.pool) / (run.doublings + kPrior);
+  const double joined = (own + kPrior * run.pool) / (run.doublings + kPrior);
+  const double moved = own < 0.0 ? run.pool : std::max(own / run.doublings, joined);
   return static_cast<float>(std::sqrt(run.factor * moved));
 }
 

@@ -193,6 +193,7 @@ Expected<void> GatherIntegrator::run(Progress& progress) {
 Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   const std::size_t count = map_.size();
   WarmLinks links(count, waves_.size());
+  std::vector<std::uint8_t> uneven(count);
   std::vector<Vec3> first(count);     // light that needs no texel to be known: direct, and what rays see shine
   std::vector<Vec3> constant(count);  // the same and light from hits without texels
   auto traced = forEachWave(progress, [&](std::size_t w) {
@@ -210,6 +211,7 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
       constant[start + i] = first[start + i] + warm[i].relit;
       warmBacks_[start + i] = static_cast<std::uint8_t>(warm[i].backs);
       backFaces_[start + i] = static_cast<float>(std::popcount(warm[i].backs));
+      uneven[start + i] = warm[i].isUneven() ? 1 : 0;
       if (!scene_.indirectOnly) continue;
       direct_[start + i] = warm[i].direct;
       seen_[start + i] = warm[i].seen * static_cast<float>(GatherWave::kWarmRays);
@@ -223,6 +225,7 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   std::vector<PackedColor> reflected = solveLinks(links, std::move(first), constant);
   constant = std::vector<Vec3>();
   makeGuides(links, reflected);
+  map_.setUneven(uneven);
   if (scene_.levels.endless) cache_ = std::move(reflected);
   scene_.reflectance = reflectance_;
   for (std::size_t t = 0; t < count; ++t)

@@ -122,14 +122,14 @@ LUMEL_FOR_EACH_CPU int differentNeighbours(const RayPacket& packet) {
 }
 
 LUMEL_FOR_EACH_CPU FoundTexels sortFound(const RayPacket& packet, const std::array<std::uint32_t, kLanes>& texels,
-                                         std::uint32_t near) {
+                                         std::uint32_t others) {
   FoundTexels found;
   std::uint32_t lookedUp = 0, hits = 0, rays = 0;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const std::uint32_t bit = 1u << lane;
     const bool isRay = packet.valid[lane] != 0;
     const bool isHit = isRay & (packet.rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID);
-    const bool isLookedUp = isHit & (texels[lane] != kNoTexel) & ((near & bit) == 0);
+    const bool isLookedUp = isHit & (texels[lane] != kNoTexel) & ((others & bit) == 0);
     found.texels[lane] = isLookedUp ? texels[lane] : 0u;
     lookedUp |= isLookedUp ? bit : 0u;
     hits |= isHit ? bit : 0u;

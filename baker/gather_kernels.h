@@ -51,8 +51,8 @@ struct FoundTexels {
   std::uint32_t others = 0;  // what a ray hit is not to be looked up
   std::uint32_t missed = 0;
 };
-/// `texels`: kNoTexel where there is none; `near`: bits of lanes that are not to be looked up.
-FoundTexels sortFound(const RayPacket& packet, const std::array<std::uint32_t, kLanes>& texels, std::uint32_t near);
+/// `texels`: kNoTexel where there is none; `others`: bits of more lanes that are not to be looked up.
+FoundTexels sortFound(const RayPacket& packet, const std::array<std::uint32_t, kLanes>& texels, std::uint32_t others);
 
 /// light = radiance[texel * stride] * weight for the lanes that are looked up, else 0.
 void lookUpLight(const FoundTexels& found, const PackedColor* radiance, std::uint32_t stride, const float* weight,

@@ -1,7 +1,7 @@
 // Rays that end on the texel cache: a ray stops at the first surface whose texel knows what it reflects. Where a hit
 // has no texel (a surface without lightmap, the back of a single-sided one) it is shaded on the spot: its direct light
-// is sampled and one ray goes on, until it meets a texel. So is a hit that is only a few texels away: in corners, in
-// gaps and at the feet of things one value for a whole texel would tell its neighbours the wrong light.
+// is sampled and one ray goes on, until it meets a texel. So is a hit for which one value for a whole texel is too
+// coarse: one that is closer than a texel is wide, and one on a texel that something stands on or close by.
 #pragma once
 
 #include <algorithm>
@@ -17,10 +17,6 @@
 #include "baker/texel_cache.h"
 
 namespace lumel {
-
-/// Hits that are nearer than so many of their texels are shaded on the spot; those of gather rays may be told so from
-/// farther away.
-inline constexpr float kNearTexels = 1.5f;
 
 /// A ray on its way, and the gather ray that it belongs to.
 struct Flight {
@@ -48,11 +44,9 @@ class GatherTracer {
                int lastDepth, Sink& sink)
       : transport_(transport), map_(map), reflectance_(reflectance), lastDepth_(lastDepth), sink_(sink) {}
 
-  /// What the rays of a packet found, near or not; flightOf(lane) tells of each.
+  /// What the rays of a packet found; flightOf(lane) tells of each.
   template <class FlightOf>
-  void arriveAll(const RayPacket& packet, FlightOf flightOf) {
-    TexelMap::Lookup lookup;
-    map_.findAll(packet, lookup, 0.0f);
+  void arriveAll(const RayPacket& packet, const TexelMap::Lookup& lookup, FlightOf flightOf) {
     for (const std::uint32_t texel : lookup.texels)
       if (texel != kNoTexel) sink_.prefetch(texel);
     for (int lane = 0; lane < kLanes; ++lane)
@@ -75,14 +69,11 @@ class GatherTracer {
       if (part.firstEmitter >= 0) findEmission(packet, lane, flight);
     }
     if (flight.depth >= lastDepth_) return;
-    const bool near = (lookup.near >> lane & 1u) != 0;
-    if (texel != kNoTexel && !behind && !near)
+    const bool tooCoarse = ((lookup.near | lookup.uneven) >> lane & 1u) != 0;
+    if (texel != kNoTexel && !behind && !tooCoarse)
       sink_.texel(flight, texel);
     else
-      leaveToShade(flight, packet, lane,
-                   reflectance_.empty() || texel == kNoTexel
-                       ? transport_.materials.albedo(transport_.rays.pointAt(packet, lane))
-                       : unpackColor(reflectance_[texel]));
+      leaveToShade(flight, packet, lane, albedoOf(packet, lane, lookup));
   }
 
   /// In two steps: brings closer what shading the hit will read.
@@ -135,6 +126,17 @@ class GatherTracer {
       sink_.light(flight, emitted * misWeight(flight.pdf, transport_.emissive.pdf(hit, flight.origin)), flight.depth);
   }
 
+  /// Of a hit to be shaded. Textures are not read where the texel knows their mean. Without them the material tells
+  /// better: what a texel holds beside a thing that stands on it may differ from what is under it.
+  Vec3 albedoOf(const RayPacket& packet, int lane, const TexelMap::Lookup& lookup) const {
+    const auto l = static_cast<std::size_t>(lane);
+    const Primitive& primitive = *transport_.rays.parts()[lookup.parts[l]].primitive;
+    if (transport_.materials.hasOneAlbedo(primitive)) return transport_.materials.albedo({&primitive});
+    if (reflectance_.empty() || lookup.texels[l] == kNoTexel)
+      return transport_.materials.albedo(transport_.rays.pointAt(packet, lane));
+    return unpackColor(reflectance_[lookup.texels[l]]);
+  }
+
   void leaveToShade(const Flight& flight, const RayPacket& packet, int lane, const Vec3& albedo) {
     const float most = std::max({albedo.x, albedo.y, albedo.z});
     if (most == 0.0f) return;
@@ -158,7 +160,7 @@ class GatherTracer {
         if (waiting_ >= kLanes) shade(kLanes);
         break;
       case Stage::Traced:
-        map_.findPixels(packet_, lookup_, kNearTexels);
+        map_.findPixels(packet_, lookup_);
         forEachLane(lookup_.others | lookup_.near,
                     [&](std::size_t lane) { expectSpot(packet_, static_cast<int>(lane)); });
         stage_ = Stage::Placed;
@@ -167,7 +169,7 @@ class GatherTracer {
         map_.findTexels(lookup_);
         for (const std::uint32_t texel : lookup_.texels)
           if (texel != kNoTexel) sink_.prefetch(texel);
-        forEachLane(lookup_.others | lookup_.near,
+        forEachLane(lookup_.others | lookup_.near | lookup_.uneven,
                     [&](std::size_t lane) { expectSpot(packet_, static_cast<int>(lane), lookup_.texels[lane]); });
         stage_ = Stage::Found;
         break;

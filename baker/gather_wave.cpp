@@ -175,6 +175,8 @@ Vec3 unpackWeight(std::uint32_t packed) {
   return Vec3(packed & 1023u, (packed >> 10) & 1023u, (packed >> 20) & 1023u) / 1023.0f;
 }
 
+bool WarmTexel::isUneven() const { return (nears | backs) != 0 && backs != (1u << GatherWave::kWarmRays) - 1u; }
+
 GatherWave::GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t first, std::size_t count)
     : scene_(scene),
       page_(page),
@@ -279,8 +281,12 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
     for (std::size_t lane = count_; lane < kLanes; ++lane) rays.packet.valid[lane] = 0;
     for (std::size_t lane = 0; lane < count_; ++lane)
       if (covered_[lane]) links[lane * kWarmRays + s].bin = guideBin(rays.dirTangent.z[lane], u.y[lane]);
+    TexelMap::Lookup& lookup = packets_[0].lookup;
+    scene_.map.findAll(rays.packet, lookup);
+    forEachLane(lookup.near, [&](std::size_t lane) { texels[lane].nears |= 1u << s; });
+    lookup.near = 0;  // links lead to texels
     Flight flight;
-    tracer.arriveAll(rays.packet, [&](int lane) -> const Flight& {
+    tracer.arriveAll(rays.packet, lookup, [&](int lane) -> const Flight& {
       const auto l = static_cast<std::size_t>(lane);
       ++counts.rays;
       flight = flightOf(l, s, from, rays);
@@ -299,14 +305,6 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   return texels;
 }
 
-/// A texel nearer than this fills as much of the hemisphere as four of so many rays: the next ones would look up its
-/// one value again and again, and what that lacks would stay while noise falls. Of fewer samples noise hides it.
-static float nearTexelsAfter(std::uint32_t samples) {
-  constexpr std::uint32_t kFew = 512;
-  constexpr float kMost = 5.0f;  // more makes bakes to a small target slower and hardly better
-  return samples < kFew ? kNearTexels : std::min(0.2f * std::sqrt(static_cast<float>(samples)), kMost);
-}
-
 GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
                                 std::span<const std::uint8_t> buried, const Guide& guide,
                                 std::span<LightSpread> spreads) {
@@ -317,7 +315,6 @@ GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::spa
   for (std::size_t lane = 0; lane < count_; ++lane) covered_[lane] = points_.covered(lane);
   coveredCount_ = static_cast<std::size_t>(std::count(covered_.begin(), covered_.end(), true));
   if (coveredCount_ == 0) return result;
-  nearTexels_ = nearTexelsAfter(first);
   for (std::size_t lane = 0; lane < count_; ++lane)
     if ((first_ + lane) % PathIntegrator::kProbeStride == 0) sink.probedLane = lane;
   for (std::uint32_t sample = first; sample < end;) {
@@ -420,7 +417,7 @@ void GatherWave::gatherRays(const NetRange& net, const Guide& guide, GatherSink&
       if ((packet(3).cell & 15u) == 15u) settle(sink.sums, sink.totals);
     }
     if (inFlight(2)) scene_.map.findTexels(packet(2).lookup);
-    if (inFlight(1)) scene_.map.findPixels(packet(1).rays.packet, packet(1).lookup, nearTexels_);
+    if (inFlight(1)) scene_.map.findPixels(packet(1).rays.packet, packet(1).lookup);
     if (inFlight(0)) scene_.map.findTriangles(packet(0).rays.packet, packet(0).lookup);
     if (inFlight(1)) expectSpots(packet(1), tracer);
     if (inFlight(2)) expectLight(packet(2), tracer, sink);
@@ -451,7 +448,7 @@ void GatherWave::expectSpots(const Packet& packet, const GatherTracer<GatherSink
 void GatherWave::expectLight(const Packet& packet, const GatherTracer<GatherSink>& tracer, const GatherSink& sink) {
   const TexelMap::Lookup& lookup = packet.lookup;
   for (const std::uint32_t texel : lookup.texels) sink.prefetch(texel != kNoTexel ? texel : 0u);
-  forEachLane(lookup.others | lookup.near, [&](std::size_t lane) {
+  forEachLane(lookup.others | lookup.near | lookup.uneven, [&](std::size_t lane) {
     tracer.expectSpot(packet.rays.packet, static_cast<int>(lane), lookup.texels[lane]);
   });
 }
@@ -460,8 +457,8 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
   const AimedRays& rays = packet.rays;
   const TexelMap::Lookup& lookup = packet.lookup;
   const int level = scene_.levels.read(scene_.bounces, 0);
-  const FoundTexels found =
-      sortFound(rays.packet, lookup.texels, level >= 0 ? lookup.others | lookup.near : lookup.others);
+  const std::uint32_t tooCoarse = level >= 0 ? lookup.near | lookup.uneven : 0u;
+  const FoundTexels found = sortFound(rays.packet, lookup.texels, lookup.others | tooCoarse);
   sink.result.rays += static_cast<std::uint64_t>(std::popcount(found.lookedUp | found.others | found.missed));
   Vec3Lanes light;
   if (level >= 0)

@@ -107,6 +107,11 @@ struct WarmTexel {
   Vec3 seen{0};             // the same from what rays see shine by itself
   Vec3 relit{0};            // the same from hits without texels: light of one bounce and more
   std::uint32_t backs = 0;  // bits of the rays that met backs
+  std::uint32_t nears = 0;  // and of those that ended near (TexelMap::kNearTexels)
+
+  /// Some of it is shut away, by what stands on it or close by or by what it reaches into, so that its mean is not what
+  /// is seen of it. Wholly inside of something it is even.
+  bool isUneven() const;
 };
 
 struct GatherSink;
@@ -166,7 +171,6 @@ class GatherWave {
   SampleLanes lightSamples_;
   std::vector<LightTally> lightTallies_;  // of the strategies
   NetLanes net_;
-  float nearTexels_ = 0.0f;  // hits nearer than so many of their texels are shaded on the spot
   CoherencePilot pilot_;
   static constexpr std::uint32_t kInFlight = 4;
   std::array<Packet, kInFlight> packets_;

@@ -30,6 +30,10 @@ class Materials {
 
   /// Share of light reflected, 0..1: base colour times texture times vertex colour.
   Vec3 albedo(const TrianglePoint& point) const;
+  /// Whether albedo() is the same on all of the primitive.
+  bool hasOneAlbedo(const Primitive& primitive) const {
+    return primitive.colors.empty() && colorTexture(primitive.material) == nullptr;
+  }
   /// Brings what albedo() will read closer; of no effect on results.
   void prefetchAlbedo(const TrianglePoint& point) const;
   /// Radiance sent out from the front (and from the back where doubleSided): nits. Alpha is not applied.

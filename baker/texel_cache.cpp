@@ -24,6 +24,8 @@ float texelWidth(const Surface& surface, std::size_t triangle, const std::array<
   return texels > 0.0f ? std::sqrt(meters2 / texels) : 0.0f;
 }
 
+constexpr std::uint32_t kTileTexels = 16;
+constexpr std::uint32_t kCovered = (1u << kTileTexels) - 1u;  // of Tile::bits
 std::uint32_t tileBit(std::uint32_t x, std::uint32_t y) { return 4 * (y & 3u) + (x & 3u); }
 
 /// How many of the lowest 16 bits are set.
@@ -68,9 +70,9 @@ TexelMap::TexelMap(const RayScene& rays, const Atlas& atlas, const std::vector<P
     for (std::size_t i = 0; i < texels[p].size(); ++i) {
       const TexelCoord c = texels[p].coords[i];
       const std::uint32_t texel = firstOfPage_[p] + static_cast<std::uint32_t>(i);
-      Tile& tile = tiles_[page.firstTile + std::size_t{c.y} / 4 * tilesAcross_ + c.x / 4];
-      if (tile.covered == 0) tile.first = texel;
-      tile.covered |= 1u << tileBit(c.x, c.y);
+      Tile& tile = tiles_[tileOf(page, c.x, c.y)];
+      if (tile.bits == 0) tile.first = texel;
+      tile.bits |= 1u << tileBit(c.x, c.y);
       // The order of PageTexels: what comes later lies behind it in its tile.
       LUMEL_CHECK(at(page, c.x, c.y) == texel);
     }
@@ -114,6 +116,15 @@ void TexelMap::addSurface(std::uint32_t part, const Surface& surface) {
   }
 }
 
+void TexelMap::setUneven(std::span<const std::uint8_t> uneven) {
+  for (std::size_t p = 0; p < texels_.size(); ++p)
+    for (std::size_t i = 0; i < texels_[p].size(); ++i) {
+      const TexelCoord c = texels_[p].coords[i];
+      if (uneven[firstOfPage_[p] + i])
+        tiles_[tileOf(pages_[p + 1], c.x, c.y)].bits |= 1u << (kTileTexels + tileBit(c.x, c.y));
+    }
+}
+
 std::size_t TexelMap::pageOf(std::uint32_t texel) const {
   return static_cast<std::size_t>(std::upper_bound(firstOfPage_.begin(), firstOfPage_.end(), texel) -
                                   firstOfPage_.begin()) -
@@ -130,9 +141,9 @@ std::uint32_t TexelMap::at(const PageMap& page, int x, int y) const {
   if (x < 0 || y < 0 || x >= page.width || y >= page.height) return kNoTexel;
   const auto column = static_cast<std::uint32_t>(x);
   const auto row = static_cast<std::uint32_t>(y);
-  const Tile& tile = tiles_[page.firstTile + std::size_t{row / 4} * tilesAcross_ + column / 4];
+  const Tile& tile = tiles_[tileOf(page, column, row)];
   const std::uint32_t bit = 1u << tileBit(column, row);
-  return (tile.covered & bit) != 0 ? tile.first + countBits(tile.covered & (bit - 1u)) : kNoTexel;
+  return (tile.bits & bit) != 0 ? tile.first + countBits(tile.bits & (bit - 1u)) : kNoTexel;
 }
 
 /// Of a hit on an instance, whose normal Embree gives in the space that its triangles are in.
@@ -192,7 +203,7 @@ void TexelMap::findTriangles(const RayPacket& packet, Lookup& lookup) const {
 }
 
 LUMEL_FOR_EACH_CPU void TexelMap::placePixels(const RayPacket& packet, const Triangle* triangles,
-                                              std::uint32_t tilesAcross, float nearTexels, Lookup& lookup) {
+                                              std::uint32_t tilesAcross, Lookup& lookup) {
   std::array<LaneWords, 8> columns;
   turnRows<8>([&](std::size_t lane) { return triangles + lookup.triangles[lane]; }, columns);
   alignas(64) float of[8][kLanes];  // Triangle's members in order
@@ -212,7 +223,7 @@ LUMEL_FOR_EACH_CPU void TexelMap::placePixels(const RayPacket& packet, const Tri
     lookup.y[lane] = y;
     const bool isHit = (packet.valid[lane] != 0) & (packet.rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID);
     const bool shines = of[7][lane] == kShines;
-    const bool isNear = !shines & (packet.rayhit.ray.tfar[lane] < nearTexels * of[7][lane]);
+    const bool isNear = !shines & (packet.rayhit.ray.tfar[lane] < kNearTexels * of[7][lane]);
     const std::uint32_t bit = 1u << lane;
     hits |= isHit ? bit : 0u;
     others |= !isFound | shines ? bit : 0u;
@@ -225,9 +236,9 @@ LUMEL_FOR_EACH_CPU void TexelMap::placePixels(const RayPacket& packet, const Tri
   lookup.near = near & hits;
 }
 
-void TexelMap::findPixels(const RayPacket& packet, Lookup& lookup, float nearTexels) const {
+void TexelMap::findPixels(const RayPacket& packet, Lookup& lookup) const {
   static_assert(sizeof(Triangle) == 32 && offsetof(Triangle, firstTile) == 24 && offsetof(Triangle, texelMeters) == 28);
-  placePixels(packet, triangles_.data(), tilesAcross_, nearTexels, lookup);
+  placePixels(packet, triangles_.data(), tilesAcross_, lookup);
   for (const std::uint32_t tile : lookup.tiles) __builtin_prefetch(tiles_.data() + tile);
 }
 
@@ -239,14 +250,18 @@ LUMEL_FOR_EACH_CPU bool TexelMap::countTexels(const Tile* tiles, Lookup& lookup)
   alignas(64) std::uint32_t of[2][kLanes];
   std::memcpy(of, &columns, sizeof of);
   int beside = 0;
+  std::uint32_t uneven = 0;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const std::uint32_t covered = of[1][lane];
+    const std::uint32_t bits = of[1][lane];
     const std::uint32_t bit = 1u << lookup.bits[lane];
-    const std::uint32_t texel = of[0][lane] + countBits(covered & (bit - 1u));
-    const bool isCovered = (covered & bit) != 0;
+    const std::uint32_t texel = of[0][lane] + countBits(bits & (bit - 1u));
+    const bool isCovered = (bits & bit) != 0;
+    const bool isUneven = (bits >> kTileTexels & bit) != 0;
     lookup.texels[lane] = isCovered ? texel : kNoTexel;
     beside |= !isCovered & (lookup.triangles[lane] != kNowhere) ? 1 : 0;
+    uneven |= isUneven ? 1u << lane : 0u;
   }
+  lookup.uneven = uneven & ~lookup.others;
   return beside != 0;
 }
 
@@ -289,7 +304,7 @@ std::uint32_t TexelMap::nearestValid(std::size_t pageIndex, std::size_t texel,
 std::vector<std::uint8_t> TexelMap::tilesWith(std::span<const std::uint8_t> valid) const {
   std::vector<std::uint8_t> tiles(tiles_.size(), 0);
   for (std::size_t i = 0; i < tiles_.size(); ++i)
-    for (std::uint32_t t = tiles_[i].first; t < tiles_[i].first + countBits(tiles_[i].covered); ++t)
+    for (std::uint32_t t = tiles_[i].first; t < tiles_[i].first + countBits(tiles_[i].bits & kCovered); ++t)
       tiles[i] |= valid[t];
   return tiles;
 }

@@ -31,14 +31,19 @@ class TexelMap {
   /// a caller can do other work in between.
   struct Lookup;
   void findTriangles(const RayPacket& packet, Lookup& lookup) const;
-  void findPixels(const RayPacket& packet, Lookup& lookup, float nearTexels) const;
+  void findPixels(const RayPacket& packet, Lookup& lookup) const;
   void findTexels(Lookup& lookup) const;
   /// All three, where there is no other work: the lanes at least wait for memory together.
-  void findAll(const RayPacket& packet, Lookup& lookup, float nearTexels) const {
+  void findAll(const RayPacket& packet, Lookup& lookup) const {
     findTriangles(packet, lookup);
-    findPixels(packet, lookup, nearTexels);
+    findPixels(packet, lookup);
     findTexels(lookup);
   }
+
+  /// Hits that are nearer than so many of their texels: one value for a whole texel is too coarse for them.
+  static constexpr float kNearTexels = 0.5f;
+  /// From now on hits on these texels (a flag for each texel) are too coarse from afar, too.
+  void setUneven(std::span<const std::uint8_t> uneven);
 
   /// For each texel that is `wanting` and not `valid`: the nearest valid one of the same chart, within kReach texels;
   /// pairs of (texel, source) in the order of texels. Texels without such a neighbour are left out.
@@ -71,7 +76,7 @@ class TexelMap {
   /// many more as are covered before it: the map of a page fits into a processor's cache.
   struct Tile {
     std::uint32_t first = 0;
-    std::uint32_t covered = 0;  // bit 4 * (y % 4) + x % 4
+    std::uint32_t bits = 0;  // bit 4 * (y % 4) + x % 4: the pixel is covered; 16 higher: its texel is uneven
   };
   /// Triangle, page and tile that stand for having none: lookups need no branches.
   static constexpr std::uint32_t kNowhere = 0;
@@ -80,11 +85,14 @@ class TexelMap {
   void addSurface(std::uint32_t part, const Surface& surface);
   static void chooseTriangles(const RayPacket& packet, const PartMap* parts, Lookup& lookup);
   static void placePixels(const RayPacket& packet, const Triangle* triangles, std::uint32_t tilesAcross,
-                          float nearTexels, Lookup& lookup);
+                          Lookup& lookup);
   static bool countTexels(const Tile* tiles, Lookup& lookup);
   const PageMap& pageOf(const Triangle& triangle) const;
   bool fromBehind(std::uint32_t part, const RayPacket& packet, int lane) const;
   std::uint32_t texelBeside(const PageMap& page, const Vec2& pixel) const;
+  std::size_t tileOf(const PageMap& page, std::uint32_t x, std::uint32_t y) const {
+    return page.firstTile + std::size_t{y / 4} * tilesAcross_ + x / 4;
+  }
   std::uint32_t at(const PageMap& page, int x, int y) const;
   std::uint32_t chartOf(const PageTexels& page, std::size_t texel) const;
   std::vector<std::uint8_t> chartsWith(std::span<const std::uint8_t> valid) const;
@@ -112,7 +120,9 @@ struct TexelMap::Lookup {
   // Bits of lanes:
   std::uint32_t behind;  // the hit is on the back
   std::uint32_t others;  // the texel does not tell all: a back, something that shines by itself, or no texel at all
-  std::uint32_t near;    // not shining, and the ray is shorter than `nearTexels` texels of it: one value is too coarse
+  // One value for a texel is too coarse, and the hit does not shine:
+  std::uint32_t near;    // the ray is shorter than kNearTexels
+  std::uint32_t uneven;  // as setUneven said
 
  private:
   friend TexelMap;

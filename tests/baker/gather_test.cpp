@@ -259,6 +259,32 @@ TEST(Gather, GapsNarrowerThanTexels) {
   EXPECT_NEAR(lit, expected, 0.2 * expected);
 }
 
+// A mat lies on the floor, half on one texel and half on the next: what the ceiling sees of these texels is their open
+// half, not the mean of that and of the dark beneath.
+TEST(Gather, TexelsThatThingsLieOn) {
+  TestScene test;
+  const int white = test.addMaterial(Vec3(0.8f));
+  test.addRectangle({0, 0, 6}, {6, 0, 0}, {0, 0, -6}, {.material = white, .texels = 3});
+  const int black = test.addMaterial(Vec3(0.0f));
+  test.addRectangle({1, 0.01f, 6}, {2, 0, 0}, {0, 0, -6}, {.material = black, .texels = 1});
+  test.addRectangle({1, 0.01f, 0}, {2, 0, 0}, {0, 0, 6}, {.material = black, .texels = 1});
+  const int ceiling = test.addRectangle({0, 4, 0}, {6, 0, 0}, {0, 0, 6}, {.material = white, .texels = 2});
+  Light light;
+  light.intensity = 10.0f;
+  light.position = {3.0f, 2.0f, 3.0f};
+  test.scene.lights = {light};
+  test.integrator = Integrator::Path;
+  const Image path = test.bake({.samples = 4096, .indirectOnly = true}).pages[static_cast<std::size_t>(ceiling)].flat;
+  test.integrator = Integrator::Gather;
+  const Image gather = test.bake({.samples = 512, .indirectOnly = true}).pages[static_cast<std::size_t>(ceiling)].flat;
+  double lit = 0, expected = 0;
+  for (std::size_t i = 0; i < path.pixels.size(); ++i) {
+    lit += static_cast<double>(gather.pixels[i]);
+    expected += static_cast<double>(path.pixels[i]);
+  }
+  EXPECT_NEAR(lit, expected, 0.01 * expected);
+}
+
 // Nothing but the floor has texels: every hit is shaded on the spot, and the bounces asked for are counted exactly.
 TEST(Gather, SurfacesWithoutTexels) {
   for (const int bounces : {0, 1, 2, 5}) {

@@ -48,6 +48,9 @@ void expectTexelsUnderHits(bool placedByEmbree) {
   const Mapped mapped(test);
   ASSERT_EQ(mapped.rays->placesInstances(), placedByEmbree);
   ASSERT_LT(mapped.texels[1].size(), 40u);
+  std::vector<std::uint8_t> uneven(mapped.map->size());
+  for (std::size_t t = 0; t < uneven.size(); t += 3) uneven[t] = 1;
+  mapped.map->setUneven(uneven);
   std::map<std::string, int> seen;
   for (std::uint32_t p = 0; p < 200; ++p) {
     RayPacket packet;
@@ -59,7 +62,7 @@ void expectTexelsUnderHits(bool placedByEmbree) {
     }
     mapped.rays->intersect(packet, TraceMode::Packet);
     TexelMap::Lookup lookup;
-    mapped.map->findAll(packet, lookup, 0.0f);
+    mapped.map->findAll(packet, lookup);
     for (int lane = 0; lane < kLanes; ++lane) {
       const std::uint32_t found = lookup.texels[static_cast<std::size_t>(lane)];
       std::uint32_t expected = kNoTexel;
@@ -84,6 +87,8 @@ void expectTexelsUnderHits(bool placedByEmbree) {
         ++seen["miss"];
         EXPECT_EQ((lookup.behind | lookup.others | lookup.near) >> lane & 1u, 0u);
       }
+      const bool tellsAll = found != kNoTexel && (lookup.others >> lane & 1u) == 0;
+      EXPECT_EQ(lookup.uneven >> lane & 1u, tellsAll && uneven[found] ? 1u : 0u) << "packet " << p << " lane " << lane;
       EXPECT_EQ(found, expected) << "packet " << p << " lane " << lane;
     }
   }

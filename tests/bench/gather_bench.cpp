@@ -3,8 +3,8 @@
 //   lumel_bench_gather --benchmark_filter=speedup     the ratios, naive and gather taken in turns
 //   lumel_bench_gather --benchmark_filter=smoke       the smoke pass of ctest
 // Counters: ns per ray in all (gather_ns, naive_ns), inside Embree (trace_ns, naive_trace_ns) and outside of it. The
-// gather goes on from near hits, where the naive loop ends: went_on is the share of its rays that do; they count as
-// rays, and their tracing as Embree's.
+// gather goes on from hits that are near or on uneven texels, where the naive loop ends: went_on is the share of its
+// rays that do; they count as rays, and their tracing as Embree's.
 #include <benchmark/benchmark.h>
 
 #include <x86intrin.h>
@@ -58,6 +58,21 @@ struct Fixture {
     pixels.assign(static_cast<std::size_t>(page.width) * static_cast<std::size_t>(page.height), kNoTexel);
     for (std::size_t t = 0; t < page.size(); ++t)
       pixels[pixelOf(page.coords[t].x, page.coords[t].y)] = static_cast<std::uint32_t>(t);
+    findUneven();
+  }
+  /// As the warm-up of a bake does.
+  void findUneven() {
+    const PageTexels& page = transport.texels[0];
+    std::vector<std::uint8_t> uneven(page.size());
+    std::array<CacheLink, std::size_t{kLanes} * GatherWave::kWarmRays> links;
+    for (std::size_t first = 0; first < page.size(); first += kLanes) {
+      const std::size_t count = std::min<std::size_t>(kLanes, page.size() - first);
+      GatheredWave counts;
+      const auto warm =
+          GatherWave(scene, 0, first, count).warmUp(std::span(links).first(count * GatherWave::kWarmRays), counts);
+      for (std::size_t i = 0; i < count; ++i) uneven[first + i] = warm[i].isUneven() ? 1 : 0;
+    }
+    map.setUneven(uneven);
   }
   std::size_t pixelOf(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(transport.texels[0].width) +
