@@ -317,16 +317,23 @@ GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::spa
   if (coveredCount_ == 0) return result;
   for (std::size_t lane = 0; lane < count_; ++lane)
     if ((first_ + lane) % PathIntegrator::kProbeStride == 0) sink.probedLane = lane;
+  GatherTracer tracer(scene_.transport, scene_.map, scene_.reflectance, scene_.lastDepth, sink);
   for (std::uint32_t sample = first; sample < end;) {
     const NetRange net = netAt(sample, end);
     if (!spreads.empty()) gatherLight(net, spreads, sink);
     points_.draw(samplers_, kFootprint, net.first, std::min(WavePoints::kMost, net.count()));
     sink.tallied = !spreads.empty() && isPilot(net.first);
-    gatherRays(net, guide, sink);
-    if (sink.tallied) sink.rays.enter(spreads.back(), net.count(), coveredCount_);
+    gatherRays(net, guide, tracer, sink);
+    if (sink.tallied) {
+      tracer.finish();
+      sink.rays.enter(spreads.back(), net.count(), coveredCount_);
+    }
     sink.rays = {};
     sample += net.count();
   }
+  tracer.finish();
+  result.rays += tracer.rays();
+  result.shadowRays += tracer.shadowRays();
   sink.finish();
   return result;
 }
@@ -396,10 +403,10 @@ void GatherWave::sampleStrategy(std::size_t strategy, std::uint32_t first, std::
   settle(sink.sums, sink.totals);
 }
 
-void GatherWave::gatherRays(const NetRange& net, const Guide& guide, GatherSink& sink) {
+void GatherWave::gatherRays(const NetRange& net, const Guide& guide, GatherTracer<GatherSink>& tracer,
+                            GatherSink& sink) {
   const GuideTable table(net.log2Count >= kLeastGuided ? guide : Guide());
   net_.fill(samplers_, covered_, net, kDirection);
-  GatherTracer tracer(scene_.transport, scene_.map, scene_.reflectance, scene_.lastDepth, sink);
   const std::uint32_t count = net.count();
   // While one packet is traced, memory is asked for what those before it hit. What is there already is read first: it
   // would wait behind what is asked for.
@@ -422,11 +429,8 @@ void GatherWave::gatherRays(const NetRange& net, const Guide& guide, GatherSink&
     if (inFlight(1)) expectSpots(packet(1), tracer);
     if (inFlight(2)) expectLight(packet(2), tracer, sink);
   }
-  tracer.finish();
   sink.judgePoints(net);
   settle(sink.sums, sink.totals);
-  sink.result.rays += tracer.rays();
-  sink.result.shadowRays += tracer.shadowRays();
 }
 
 /// The footprint point of the rays into a cell: any 16 neighbouring cells use all points of a texel, and where a point

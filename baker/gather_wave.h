@@ -147,7 +147,7 @@ class GatherWave {
   void gatherLight(const NetRange& net, std::span<LightSpread> spreads, GatherSink& sink);
   void sampleStrategy(std::size_t strategy, std::uint32_t first, std::uint32_t end, float weight, bool pilot,
                       GatherSink& sink);
-  void gatherRays(const NetRange& net, const Guide& guide, GatherSink& sink);
+  void gatherRays(const NetRange& net, const Guide& guide, GatherTracer<GatherSink>& tracer, GatherSink& sink);
   /// A packet of gather rays, from its start to where the light of its texels is known.
   struct Packet {
     std::uint32_t cell = 0;  // of the net
