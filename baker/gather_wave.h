@@ -109,8 +109,8 @@ struct WarmTexel {
   std::uint32_t backs = 0;  // bits of the rays that met backs
   std::uint32_t nears = 0;  // and of those that ended near (TexelMap::kNearTexels)
 
-  /// Some of it is shut away, by what stands on it or close by or by what it reaches into, so that its mean is not what
-  /// is seen of it. Wholly inside of something it is even.
+  /// Some of it is shut away by what stands on it or close by, so that its mean is not what is seen of it. Texels
+  /// wholly inside of something are even.
   bool isUneven() const;
 };
 

@@ -41,7 +41,7 @@ class TexelMap {
   }
 
   /// Hits that are nearer than so many of their texels: one value for a whole texel is too coarse for them.
-  static constexpr float kNearTexels = 0.5f;
+  static constexpr float kNearTexels = 0.35f;
   /// From now on hits on these texels (a flag for each texel) are too coarse from afar, too.
   void setUneven(std::span<const std::uint8_t> uneven);
 
