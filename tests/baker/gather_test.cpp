@@ -219,7 +219,7 @@ TEST(Gather, CoarseTexelsInCorners) {
   test.integrator = Integrator::Path;
   const BakeResult path = test.bake({.samples = 16384});
   test.integrator = Integrator::Gather;
-  const BakeResult gather = test.bake({.samples = 4096});
+  const BakeResult gather = test.bake({.samples = 16384});
   double squares = 0, sum = 0, count = 0;
   for (std::size_t p = 0; p < path.pages.size(); ++p)
     for (std::size_t i = 0; i < path.pages[p].flat.pixels.size(); ++i) {
@@ -229,7 +229,7 @@ TEST(Gather, CoarseTexelsInCorners) {
       sum += expected;
       ++count;
     }
-  // Lookups of hits that are nearer than two texels too would make it 2.9%.
+  // 1.6%, half of it noise; lookups of all hits on the texels along the edges would make it 4%.
   EXPECT_LT(std::sqrt(squares / count) / (sum / count), 0.02);
 }
 
