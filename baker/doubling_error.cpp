@@ -11,6 +11,10 @@ namespace lumel {
 namespace {
 
 constexpr int kTile = 4;  // side of the tiles that PageTexels are ordered by
+/// Rates that are believed. Below 1 means fall more slowly than those of independent samples: what is seen of a cache
+/// that itself still moves, and outliers that come late.
+constexpr double kSlowest = 0.85;
+constexpr double kFastest = 2.0;
 
 }  // namespace
 
@@ -85,7 +89,7 @@ void DoublingError::endPass(const std::vector<std::uint8_t>& live) {
       before += runs_[r].movedBefore;
       now += runs_[r].moved;
     }
-  if (before > 0.0 && now > 0.0) rate_ = std::clamp(std::log2(before / now), 1.0, 2.0);
+  if (before > 0.0 && now > 0.0) rate_ = std::clamp(std::log2(before / now), kSlowest, kFastest);
   const double factor = std::pow(std::exp2(rate_) - 1.0, -credit_);
   for (std::size_t r = 0; r < runs_.size(); ++r) {
     Run& run = runs_[r];

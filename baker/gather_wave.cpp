@@ -175,7 +175,7 @@ Vec3 unpackWeight(std::uint32_t packed) {
   return Vec3(packed & 1023u, (packed >> 10) & 1023u, (packed >> 20) & 1023u) / 1023.0f;
 }
 
-bool WarmTexel::isUneven() const { return nears != 0 && backs != (1u << GatherWave::kWarmRays) - 1u; }
+int WarmTexel::shut() const { return backs == (1u << GatherWave::kWarmRays) - 1u ? 0 : std::popcount(nears); }
 
 GatherWave::GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t first, std::size_t count)
     : scene_(scene),

@@ -109,9 +109,9 @@ struct WarmTexel {
   std::uint32_t backs = 0;  // bits of the rays that met backs
   std::uint32_t nears = 0;  // and of those that ended near (TexelMap::kNearTexels)
 
-  /// Some of it is shut away by what stands on it or close by, so that its mean is not what is seen of it. Texels
-  /// wholly inside of something are even.
-  bool isUneven() const;
+  /// How many of its rays ended near: part of it may be shut away by what stands on it or close by, so that its mean is
+  /// not what is seen of it. 0 where it is wholly inside of something.
+  int shut() const;
 };
 
 struct GatherSink;
