@@ -61,7 +61,8 @@ struct TexelLight {
 ///    one bounce after another is passed along them, without further rays. Where what they find differs most, a wave
 ///    and those around it send the rays of the next step.
 /// 3. Gather: passes of 8, 8, 16, 32, ... samples per texel that continue one sequence. After each the cache is what
-///    all of them found so far.
+///    all of them found so far. Hits for which one value for a texel is too coarse (TexelMap) are shaded on the spot;
+///    whose they are is learnt from the links' rays too.
 ///
 /// With a given number of bounces N the cache holds levels, the light after 0, 1, ... N - 1 bounces, and one ray
 /// serves all of them: level k of a texel adds what level k - 1 of the texel that it hit reflects, so the result has
