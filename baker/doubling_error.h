@@ -22,10 +22,10 @@ namespace lumel {
 /// what d^2 cannot see, the noise that both halves took from the same cache, and for tails heavier than a normal
 /// distribution's. The credit is a calibration; with it 93 to 97% of texels lie within 1.96 standard errors (README).
 ///
-/// One d^2 is hardly an estimate, so others join: the texel's earlier doublings, scaled to the
-/// present by the rate; the texels of its run and of those around it on the page, which count as much as kPrior
-/// doublings, unless the texel moved more than they did: at the border of a shadow it knows better.
-/// Measured (four scenes, 32 to 1024 samples): baker/README.md.
+/// One d^2 is hardly an estimate, so others join: the texel's earlier doublings, scaled to the present by the rate; the
+/// texels of its run and of those around it on the page, which count as much as kPrior doublings, unless the texel
+/// moved more than they did: at the border of a shadow it knows better. Measured (four scenes, 32 to 1024 samples):
+/// baker/README.md.
 class DoublingError {
  public:
   static constexpr double kPrior = 4.0;

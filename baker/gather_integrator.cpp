@@ -36,10 +36,9 @@ constexpr double kSlowest = 0.98;
 constexpr int kMostSweeps = 256;
 /// Longest path through surfaces without texels, where bounces have no end of their own.
 constexpr int kLongestPath = 64;
-/// Texels that so many of their warm-up's rays say are partly shut away are uneven. After kManySamples one is enough:
-/// corners join, whose light changes from one end of a texel to the other. Of fewer samples noise hides that, and hits
-/// that are shaded on the spot add some.
-constexpr std::uint8_t kShut = 2;
+/// After so many samples one ray instead of WarmTexel::kShut makes a texel uneven: corners join, whose light changes
+/// from one end of a texel to the other. Of fewer samples noise hides that, and hits that are shaded on the spot add
+/// some.
 constexpr std::uint32_t kManySamples = 256;
 constexpr std::size_t kSweepGrain = 4096;
 constexpr std::size_t kWaveGrain = kSweepGrain / kLanes;
@@ -231,7 +230,7 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   std::vector<PackedColor> reflected = solveLinks(links, std::move(first), constant);
   constant = std::vector<Vec3>();
   makeGuides(links, reflected);
-  map_.setUneven(shut_, kShut);
+  map_.setUneven(shut_, WarmTexel::kShut);
   if (scene_.levels.endless) cache_ = std::move(reflected);
   scene_.reflectance = reflectance_;
   for (std::size_t t = 0; t < count; ++t)

@@ -110,8 +110,9 @@ struct WarmTexel {
   std::uint32_t nears = 0;  // and of those that ended near (TexelMap::kNearTexels)
 
   /// How many of its rays ended near: part of it may be shut away by what stands on it or close by, so that its mean is
-  /// not what is seen of it. 0 where it is wholly inside of something.
+  /// not what is seen of it. 0 where it is wholly inside of something. With kShut of them it is uneven.
   int shut() const;
+  static constexpr std::uint8_t kShut = 2;
 };
 
 struct GatherSink;

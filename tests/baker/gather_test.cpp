@@ -133,7 +133,7 @@ TEST(Gather, PointLightEnergyBalance) {
     for (int k = 0; k <= (bounces < 0 ? 100 : bounces); ++k) series += std::pow(0.6, k);
     // Near hits are shaded, and find the dark of the corners; far ones look up means in which it is counted once more.
     EXPECT_NEAR(meanOf(test.bake({.samples = 128, .adaptive = false, .bounces = bounces})) / (direct * series), 1.0,
-                5e-3)
+                4e-3)
         << bounces;
   }
 }
@@ -282,6 +282,7 @@ TEST(Gather, TexelsThatThingsLieOn) {
     lit += static_cast<double>(gather.pixels[i]);
     expected += static_cast<double>(path.pixels[i]);
   }
+  // 0.9986 to 1.0004; the means of whole texels would make it 0.67.
   EXPECT_NEAR(lit, expected, 0.01 * expected);
 }
 

@@ -72,7 +72,7 @@ struct Fixture {
           GatherWave(scene, 0, first, count).warmUp(std::span(links).first(count * GatherWave::kWarmRays), counts);
       for (std::size_t i = 0; i < count; ++i) shut[first + i] = static_cast<std::uint8_t>(warm[i].shut());
     }
-    map.setUneven(shut, 2);
+    map.setUneven(shut, WarmTexel::kShut);
   }
   std::size_t pixelOf(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(transport.texels[0].width) +
