@@ -136,7 +136,7 @@ class PartMerger {
   bool moveTo(const Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared,
               double leastMatch) {
     const double smaller = std::min(sheet_.chart(into).normals.area, sheet_.chart(from).normals.area);
-    for (const Fit& fit : sheet_.fits(shared, smallChartSlack(smaller))) {
+    for (const Joint& fit : sheet_.fits(shared, smallChartSlack(smaller))) {
       // What is too small for a chart of its own may hang on by any edge.
       if (smaller >= kTinyTexels && fit.length < leastMatch * border.length) return false;
       if (!sheet_.mayJoin(into, from, fit, frameGap(), options_)) continue;
@@ -156,7 +156,7 @@ class PartMerger {
     const double limit = options_.maxStretch * std::sqrt(smallChartSlack(area));
     for (const double scale : {1.0, 0.7, 0.5, 0.35}) {
       if (scale * limit < 1 || (both > kRescaledTexels && (1 - scale * scale) * area > kMostLoss * both)) break;
-      for (const Fit& fit : sheet_.hangings(shared, scale)) {
+      for (const Joint& fit : sheet_.hangings(shared, scale)) {
         if (!sheet_.mayJoin(into, from, fit, frameGap(), options_)) continue;
         sheet_.join(into, from, fit);
         return true;

@@ -168,7 +168,7 @@ void ChartSheet::insertBorder(Chart& chart, MeshEdge edge) {
   chart.rim.add({a, b, mesh_.points[v[edge.k]], mesh_.points[v[(edge.k + 1) % 3]]});
 }
 
-std::vector<Fit> ChartSheet::fits(const std::vector<MeshEdge>& shared, double slack) const {
+std::vector<Joint> ChartSheet::fits(const std::vector<MeshEdge>& shared, double slack) const {
   std::vector<std::array<Vec2d, 4>> edges;  // ends in `into`, then the same ends in `from`
   for (const MeshEdge into : shared) {
     const MeshEdge from = beyond(into);
@@ -184,13 +184,13 @@ std::vector<Fit> ChartSheet::fits(const std::vector<MeshEdge>& shared, double sl
   const std::size_t singles = edges.size() > 1 ? std::min<std::size_t>(kSeeds, edges.size()) : 0;
   for (std::size_t i = 0; i < singles; ++i) seeds.push_back({edges[order[i * order.size() / singles]]});
 
-  std::vector<Fit> found;
+  std::vector<Joint> found;
   for (const auto& seed : seeds) {
-    Fit best;
+    Joint best;
     Motion trial = procrustes(seed);
     for (int refinement = 0; refinement < 2; ++refinement) {
       std::vector<std::array<Vec2d, 4>> good;
-      Fit fit{trial, {}, 0};
+      Joint fit{trial, {}, 0};
       for (std::size_t i = 0; i < edges.size(); ++i) {
         if (!matches(edges[i], trial, slack)) continue;
         good.push_back(edges[i]);
@@ -206,18 +206,18 @@ std::vector<Fit> ChartSheet::fits(const std::vector<MeshEdge>& shared, double sl
     if (complete) break;
   }
   std::stable_sort(found.begin(), found.end(),
-                   [](const Fit& a, const Fit& b) { return a.length > b.length * (1 + 1e-9); });
+                   [](const Joint& a, const Joint& b) { return a.length > b.length * (1 + 1e-9); });
   return found;
 }
 
-std::vector<Fit> ChartSheet::hangings(const std::vector<MeshEdge>& shared, double scale) const {
-  std::vector<Fit> found;
+std::vector<Joint> ChartSheet::hangings(const std::vector<MeshEdge>& shared, double scale) const {
+  std::vector<Joint> found;
   for (const MeshEdge edge : shared) {
     const MeshEdge from = beyond(edge);
     const std::array<Vec2d, 4> ends = {
         uvs_[vertexAt(edge.triangle, edge.k)], uvs_[vertexAt(edge.triangle, (edge.k + 1) % 3)],
         uvs_[vertexAt(from.triangle, (from.k + 1) % 3)], uvs_[vertexAt(from.triangle, from.k)]};
-    Fit fit{procrustes({ends}), {edge}, glm::length(ends[1] - ends[0]), scale < 1};
+    Joint fit{procrustes({ends}), {edge}, glm::length(ends[1] - ends[0]), scale < 1};
     fit.motion.cosine *= scale;
     fit.motion.sine *= scale;
     fit.motion.shift = Vec2d(0.0);
@@ -270,7 +270,7 @@ bool ChartSheet::liesOn(const Chart& target, std::uint32_t k, const std::array<V
   return hit;
 }
 
-bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit, double frameGap,
+bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Joint& fit, double frameGap,
                          const MergeOptions& options) const {
   const Chart& target = charts_[into];
   const Chart& moved = charts_[from];
@@ -319,7 +319,7 @@ void ChartSheet::joinBreaks(std::uint32_t into, std::uint32_t from) {
   charts_[from].breaks = {};
 }
 
-void ChartSheet::join(std::uint32_t into, std::uint32_t from, const Fit& fit) {
+void ChartSheet::join(std::uint32_t into, std::uint32_t from, const Joint& fit) {
   joinBreaks(into, from);
   Chart& target = charts_[into];
   Chart& moved = charts_[from];

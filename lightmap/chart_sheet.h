@@ -24,7 +24,7 @@ struct MeshEdge {
 };
 
 /// A way to lay one chart against another: the motion, and the shared edges that then meet.
-struct Fit {
+struct Joint {
   Motion motion;
   std::vector<MeshEdge> matched;
   double length = 0;  // texels of `matched`
@@ -54,18 +54,18 @@ class ChartSheet {
 
   /// How a chart may move so that its side of the shared edges meets the other side, from which they are given: the
   /// fit to all of them and to single ones, the longest match first. `slack` multiplies the tolerance.
-  std::vector<Fit> fits(const std::vector<MeshEdge>& shared, double slack) const;
+  std::vector<Joint> fits(const std::vector<MeshEdge>& shared, double slack) const;
 
   /// For a chart that is too small to be alone: how it may hang on by each of the shared edges, squeezed towards it to
   /// the given scale.
-  std::vector<Fit> hangings(const std::vector<MeshEdge>& shared, double scale) const;
+  std::vector<Joint> hangings(const std::vector<MeshEdge>& shared, double scale) const;
 
   /// Whether `from`, moved and welded at the matched edges, keeps within the limits, lies on nothing of `into`, comes
   /// near to nothing of it that is far on the surface, and leaves `frameGap` texels at breaks of the material's frame.
-  bool mayJoin(std::uint32_t into, std::uint32_t from, const Fit& fit, double frameGap,
+  bool mayJoin(std::uint32_t into, std::uint32_t from, const Joint& fit, double frameGap,
                const MergeOptions& options) const;
 
-  void join(std::uint32_t into, std::uint32_t from, const Fit& fit);
+  void join(std::uint32_t into, std::uint32_t from, const Joint& fit);
 
   /// The two charts as one mesh, joined along `shared` as well (edges from the side of either), without UVs.
   ChartMesh together(std::uint32_t a, std::uint32_t b, const std::vector<MeshEdge>& shared) const;

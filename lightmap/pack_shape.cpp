@@ -75,16 +75,18 @@ void rasterise(const PackShape& source, GridShape& shape) {
   const bool isBox = shape.texels.count() == static_cast<std::size_t>(shape.size.x * shape.size.y);
   if (isBox || shape.size.x * shape.size.y > kMostTexelsToShift) return;
   std::size_t fewest = shape.texels.count();
-  const auto isSame = [](double share, double room) { return share != 0.5 && room <= kTexelSnap; };
-  for (const double shareY : {0.0, 0.5, 1.0})
-    for (const double shareX : {0.0, 0.5, 1.0}) {
-      if (isSame(shareX, slack.x) || isSame(shareY, slack.y) || (shareX == 0.5 && shareY == 0.5)) continue;
-      const Vec2d offset = Vec2d(shareX, shareY) * slack - box.low;
-      Bitmap texels = touchedTexels(source, offset, shape.size);
+  Vec2d best(0.5);
+  for (int axis = 0; axis < 2; ++axis)
+    for (const double end : {0.0, 1.0}) {
+      if (slack[axis] <= kTexelSnap) continue;
+      Vec2d shares = best;
+      shares[axis] = end;
+      Bitmap texels = touchedTexels(source, shares * slack - box.low, shape.size);
       const std::size_t count = texels.count();
       if (count >= fewest) continue;
       fewest = count;
-      shape.toBitmap = offset;
+      best = shares;
+      shape.toBitmap = shares * slack - box.low;
       shape.texels = std::move(texels);
     }
 }

@@ -77,7 +77,7 @@ TEST(ChartSheet, ASmallChartIsSqueezedIntoANotchThatItDoesNotFit) {
   const MergeOptions options;
   EXPECT_FALSE(sheet.mayJoin(0, 1, sheet.hangings(c.shared, 1.0).at(0), 1.0, options));
   EXPECT_FALSE(sheet.mayJoin(0, 1, sheet.hangings(c.shared, 0.7).at(0), 1.0, options));
-  const Fit fit = sheet.hangings(c.shared, 0.5).at(0);
+  const Joint fit = sheet.hangings(c.shared, 0.5).at(0);
   EXPECT_TRUE(sheet.mayJoin(0, 1, fit, 1.0, options));
   ChartSheet joined = c.sheet();
   joined.join(0, 1, fit);
