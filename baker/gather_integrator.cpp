@@ -36,10 +36,6 @@ constexpr double kSlowest = 0.98;
 constexpr int kMostSweeps = 256;
 /// Longest path through surfaces without texels, where bounces have no end of their own.
 constexpr int kLongestPath = 64;
-/// After so many samples one ray instead of WarmTexel::kShut makes a texel uneven: corners join, whose light changes
-/// from one end of a texel to the other. Of fewer samples noise hides that, and hits that are shaded on the spot add
-/// some.
-constexpr std::uint32_t kManySamples = 256;
 constexpr std::size_t kSweepGrain = 4096;
 constexpr std::size_t kWaveGrain = kSweepGrain / kLanes;
 /// Whether more or less than half of a texel's rays meet backs is certain where the lead squared, in rays, is this many
@@ -101,7 +97,6 @@ void GatherIntegrator::makeCache() {
   errors_.emplace(scene_.texels, kGatherCredit);
   if (scene_.levels.count == 0) return;
   reflectance_.resize(map_.size());
-  shut_.resize(map_.size());
   if (!scene_.levels.endless) cache_.resize(map_.size() * stored());  // else it is what the warm-up ends with
   if (!scene_.indirectOnly) return;
   direct_.resize(map_.size());
@@ -129,7 +124,6 @@ void GatherIntegrator::dropCache() {
   spreads_ = std::vector<LightSpread>();
   substitutes_ = std::vector<TexelMap::Substitute>();
   guides_ = std::vector<Guide>();
-  shut_ = std::vector<std::uint8_t>();
   scene_.reflectance = {};
 }
 
@@ -189,7 +183,7 @@ Expected<void> GatherIntegrator::run(Progress& progress) {
     } else if (options_.adaptive && end >= kFirstJudged && end < samples) {
       markDone();
     }
-    if (scene_.levels.count > 0 && first < samples) renewCache(first);
+    if (scene_.levels.count > 0 && first < samples) renewCache();
   }
   dropCache();
   progress.end();
@@ -201,6 +195,7 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   WarmLinks links(count, waves_.size());
   std::vector<Vec3> first(count);     // light that needs no texel to be known: direct, and what rays see shine
   std::vector<Vec3> constant(count);  // the same and light from hits without texels
+  std::vector<std::uint8_t> uneven(count);
   auto traced = forEachWave(progress, [&](std::size_t w) {
     const Wave& wave = waves_[w];
     const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
@@ -216,7 +211,7 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
       constant[start + i] = first[start + i] + warm[i].relit;
       warmBacks_[start + i] = static_cast<std::uint8_t>(warm[i].backs);
       backFaces_[start + i] = static_cast<float>(std::popcount(warm[i].backs));
-      shut_[start + i] = static_cast<std::uint8_t>(warm[i].shut());
+      uneven[start + i] = warm[i].isUneven() ? 1 : 0;
       if (!scene_.indirectOnly) continue;
       direct_[start + i] = warm[i].direct;
       seen_[start + i] = warm[i].seen * static_cast<float>(GatherWave::kWarmRays);
@@ -230,7 +225,8 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   std::vector<PackedColor> reflected = solveLinks(links, std::move(first), constant);
   constant = std::vector<Vec3>();
   makeGuides(links, reflected);
-  map_.setUneven(shut_, WarmTexel::kShut);
+  map_.setUneven(uneven);
+  uneven = std::vector<std::uint8_t>();
   if (scene_.levels.endless) cache_ = std::move(reflected);
   scene_.reflectance = reflectance_;
   for (std::size_t t = 0; t < count; ++t)
@@ -456,11 +452,7 @@ Vec3 GatherIntegrator::lightOf(std::size_t texel, std::size_t level) const {
   return gathered + direct_[texel] + seen_[texel] / (static_cast<float>(GatherWave::kWarmRays) + weightOf(texel));
 }
 
-void GatherIntegrator::renewCache(std::uint32_t samples) {
-  if (samples == kManySamples) {
-    map_.setUneven(shut_, 1);
-    shut_ = std::vector<std::uint8_t>();
-  }
+void GatherIntegrator::renewCache() {
   substituteInvalid();
   // The lowest level stays as the warm-up left it where it stands on others that are not kept.
   const std::size_t firstLevel = scene_.levels.base > 0 ? 1 : 0;

@@ -120,7 +120,7 @@ class GatherIntegrator {
   void dropCache();
   Expected<void> pass(std::uint32_t first, std::uint32_t end, Progress& progress);
   void store(std::size_t wave, const GatheredWave& done, std::uint32_t first, std::uint32_t end);
-  void renewCache(std::uint32_t samples);
+  void renewCache();
   void substituteInvalid();
   /// Tells by the rays so far which texels lie inside of something.
   void findBuried();
@@ -164,7 +164,6 @@ class GatherIntegrator {
   std::vector<float> backFaces_;         // rays, each by its stretch
   std::vector<std::uint8_t> buried_;     // nothing more is gathered for them
   std::vector<std::uint8_t> warmBacks_;  // bits of the warm-up's rays, until the first pass is done
-  std::vector<std::uint8_t> shut_;       // WarmTexel::shut, until it is no longer needed
   std::vector<InsideTally> inside_;
   std::vector<std::array<Vec3, kProbeNormals>> probes_;
   std::vector<std::size_t> firstProbe_;  // per page

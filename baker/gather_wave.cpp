@@ -175,7 +175,7 @@ Vec3 unpackWeight(std::uint32_t packed) {
   return Vec3(packed & 1023u, (packed >> 10) & 1023u, (packed >> 20) & 1023u) / 1023.0f;
 }
 
-int WarmTexel::shut() const { return backs == (1u << GatherWave::kWarmRays) - 1u ? 0 : std::popcount(nears); }
+bool WarmTexel::isUneven() const { return backs != (1u << GatherWave::kWarmRays) - 1u && std::popcount(nears) > 1; }
 
 GatherWave::GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t first, std::size_t count)
     : scene_(scene),
@@ -209,24 +209,39 @@ TrianglePoint GatherWave::sourceOf(const PlaceOnTriangle& place) const {
   return at;
 }
 
-/// The points drawn of a texel; asks memory for what meanReflectance reads of them.
-GatherWave::WarmPoints GatherWave::warmPoints(std::size_t lane) const {
-  WarmPoints points;
+/// How much of a triangle's area a texel is.
+float GatherWave::shareOf(const TriangleRef& triangle) const {
+  const Surface& surface = scene_.atlas.surfaces[triangle.surface];
+  const std::uint32_t* corner = surface.indices.data() + std::size_t{3} * triangle.triangle;
+  const Vec2 first = surface.lightmapUvs[corner[0]];
+  const Vec2 e1 = surface.lightmapUvs[corner[1]] - first, e2 = surface.lightmapUvs[corner[2]] - first;
+  const Page& page = scene_.atlas.pages[page_];
+  const float pages = 0.5f * std::abs(e1.x * e2.y - e1.y * e2.x);
+  return 1.0f / (pages * static_cast<float>(page.width) * static_cast<float>(page.height));
+}
+
+/// At the points drawn of a texel; asks memory for what meanReflectance reads.
+void GatherWave::findAlbedos(std::size_t lane, WarmAlbedos& albedos) const {
+  const Materials& materials = scene_.transport.materials;
   for (std::uint32_t i = 0; i < kWarmLights; ++i) {
-    points[i] = sourceOf(points_.place(lane, i));
-    scene_.transport.materials.prefetchAlbedo(points[i]);
+    const PlaceOnTriangle place = points_.place(lane, i);
+    const TrianglePoint point = sourceOf(place);
+    albedos.points[i] = point;
+    // A mean would hold what is cut away. One over all that a point stands for would reach beyond the texel.
+    const bool whole = materials.material(point.primitive->material).alphaMode == AlphaMode::Opaque;
+    const float share = whole ? 0.25f / kWarmLights * shareOf(place.triangle) : 0.0f;
+    albedos.lookups[i] = materials.findAlbedo(point, share);
+    albedos.lookups[i].prefetch();
   }
-  return points;
 }
 
 /// By area and where the surface is opaque.
-Vec3 GatherWave::meanReflectance(const WarmPoints& points) const {
-  const Materials& materials = scene_.transport.materials;
+Vec3 GatherWave::meanReflectance(const WarmAlbedos& albedos) const {
   Vec3 sum(0.0f);
   float opacities = 0.0f;
-  for (const TrianglePoint& at : points) {
-    const float opacity = materials.opacity(at);
-    sum += materials.albedo(at) * opacity;
+  for (std::size_t i = 0; i < kWarmLights; ++i) {
+    const float opacity = scene_.transport.materials.opacity(albedos.points[i]);
+    sum += Materials::albedo(albedos.lookups[i]) * opacity;
     opacities += opacity;
   }
   return opacities > 0.0f ? sum / opacities : Vec3(0.0f);
@@ -260,10 +275,10 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   std::array<WarmTexel, kLanes> texels;
   points_.draw(samplers_, kFootprint, 0, kWarmLights);
   // While one texel's memory is on its way, the one before is read.
-  std::array<WarmPoints, 2> points;
+  std::array<WarmAlbedos, 2> albedos;
   for (std::size_t lane = 0; lane <= count_; ++lane) {
-    if (lane < count_ && covered_[lane]) points[lane % 2] = warmPoints(lane);
-    if (lane > 0 && covered_[lane - 1]) texels[lane - 1].reflectance = meanReflectance(points[(lane - 1) % 2]);
+    if (lane < count_ && covered_[lane]) findAlbedos(lane, albedos[lane % 2]);
+    if (lane > 0 && covered_[lane - 1]) texels[lane - 1].reflectance = meanReflectance(albedos[(lane - 1) % 2]);
   }
   warmDirect(texels, counts);
 

@@ -109,10 +109,9 @@ struct WarmTexel {
   std::uint32_t backs = 0;  // bits of the rays that met backs
   std::uint32_t nears = 0;  // and of those that ended near (TexelMap::kNearTexels)
 
-  /// How many of its rays ended near: part of it may be shut away by what stands on it or close by, so that its mean is
-  /// not what is seen of it. 0 where it is wholly inside of something. With kShut of them it is uneven.
-  int shut() const;
-  static constexpr std::uint8_t kShut = 2;
+  /// Whether more than one of its rays ended near: part of it is shut away by what stands on it or close by, so that
+  /// its mean is not what is seen of it. Not where it is wholly inside of something.
+  bool isUneven() const;
 };
 
 struct GatherSink;
@@ -139,9 +138,14 @@ class GatherWave {
                       std::span<const std::uint8_t> buried, const Guide& guide, std::span<LightSpread> spreads);
 
  private:
-  using WarmPoints = std::array<TrianglePoint, kWarmLights>;
-  WarmPoints warmPoints(std::size_t lane) const;
-  Vec3 meanReflectance(const WarmPoints& points) const;
+  /// What a texel's reflectance is the mean of.
+  struct WarmAlbedos {
+    std::array<TrianglePoint, kWarmLights> points;
+    std::array<Materials::AlbedoLookup, kWarmLights> lookups;
+  };
+  void findAlbedos(std::size_t lane, WarmAlbedos& albedos) const;
+  Vec3 meanReflectance(const WarmAlbedos& albedos) const;
+  float shareOf(const TriangleRef& triangle) const;
   TrianglePoint sourceOf(const PlaceOnTriangle& place) const;
   void warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts);
   Flight flightOf(std::size_t lane, std::uint32_t sample, const PointLanes& from, const AimedRays& rays) const;

@@ -1,6 +1,7 @@
 #include "baker/materials.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "scene/parallel.h"
 
@@ -32,6 +33,13 @@ float applyAlphaMode(const Material& material, float alpha) {
 
 }  // namespace
 
+/// Of the triangle that a point lies on.
+static float uvAreaOf(const TrianglePoint& point, int uvSet) {
+  const auto cornerAt = [&](Vec2 barycentric) { return uvAt({point.primitive, point.triangle, barycentric}, uvSet); };
+  const Vec2 first = cornerAt({0, 0}), e1 = cornerAt({1, 0}) - first, e2 = cornerAt({0, 1}) - first;
+  return 0.5f * std::abs(e1.x * e2.y - e1.y * e2.x);
+}
+
 Vec2 uvAt(const TrianglePoint& point, int uvSet) {
   const auto& sets = point.primitive->uvSets;
   const auto set = static_cast<std::size_t>(uvSet);
@@ -41,15 +49,19 @@ Vec2 uvAt(const TrianglePoint& point, int uvSet) {
 
 Materials::Materials(const Scene& scene, bool bounces, std::vector<std::string>& notes) : scene_(&scene) {
   std::vector<char> needed(scene.images.size(), 0);
-  const auto need = [&](const TextureRef& ref) {
-    if (ref && static_cast<std::size_t>(ref.image) < needed.size()) needed[static_cast<std::size_t>(ref.image)] = 1;
+  std::vector<char> averaged(scene.images.size(), 0);
+  const auto need = [&](const TextureRef& ref, bool mean) {
+    if (!ref || static_cast<std::size_t>(ref.image) >= needed.size()) return;
+    needed[static_cast<std::size_t>(ref.image)] = 1;
+    if (mean) averaged[static_cast<std::size_t>(ref.image)] = 1;
   };
   for (const Instance& instance : scene.instances) {
     if (!instance.settings.casts) continue;
     for (const Primitive& primitive : scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives) {
       const Material& m = material(primitive.material);
-      if (bounces || m.alphaMode != AlphaMode::Opaque) need(m.baseColorMap);
-      if (emits(primitive.material)) need(m.emissionMap);
+      const bool opaque = m.alphaMode == AlphaMode::Opaque;
+      if (bounces || !opaque) need(m.baseColorMap, opaque);
+      if (emits(primitive.material)) need(m.emissionMap, false);
     }
   }
   srgbByImage_.resize(scene.images.size());
@@ -59,7 +71,7 @@ Materials::Materials(const Scene& scene, bool bounces, std::vector<std::string>&
       if (!needed[i] || scene.images[i].encoded.empty()) continue;
       auto texture = Texture::decode(scene.images[i], ColorSpace::Srgb);
       if (texture)
-        srgbByImage_[i] = *std::move(texture);
+        srgbByImage_[i].emplace(*std::move(texture), averaged[i] != 0);
       else
         failures[i] = texture.error().message;
     }
@@ -68,26 +80,30 @@ Materials::Materials(const Scene& scene, bool bounces, std::vector<std::string>&
     if (!failure.empty()) notes.push_back(failure + "; its factor is used alone");
 }
 
-const Texture* Materials::colorTexture(int index) const {
+const TexturePyramid* Materials::colorTexture(int index) const {
   const TextureRef& ref = material(index).baseColorMap;
   if (!ref || static_cast<std::size_t>(ref.image) >= srgbByImage_.size()) return nullptr;
   const auto& texture = srgbByImage_[static_cast<std::size_t>(ref.image)];
   return texture ? &*texture : nullptr;
 }
 
-Vec3 Materials::albedo(const TrianglePoint& point) const {
+Materials::AlbedoLookup Materials::findAlbedo(const TrianglePoint& point, float share) const {
   const Material& m = material(point.primitive->material);
-  Vec3 color(m.baseColor);
-  if (const Texture* texture = colorTexture(point.primitive->material))
-    color *= Vec3(texture->sample(m.baseColorMap, uvAt(point, m.baseColorMap.uvSet)));
-  if (!point.primitive->colors.empty()) color *= Vec3(interpolate(point, point.primitive->colors));
-  return glm::clamp(color, Vec3(0.0f), Vec3(1.0f));
+  AlbedoLookup lookup{Vec3(m.baseColor)};
+  if (const TexturePyramid* textures = colorTexture(point.primitive->material)) {
+    const TextureRef& ref = m.baseColorMap;
+    lookup.texture =
+        share > 0.0f ? &textures->level(ref, std::sqrt(share * uvAreaOf(point, ref.uvSet))) : &textures->finest();
+    lookup.at = lookup.texture->footprint(ref, uvAt(point, ref.uvSet));
+  }
+  if (!point.primitive->colors.empty()) lookup.factor *= Vec3(interpolate(point, point.primitive->colors));
+  return lookup;
 }
 
-void Materials::prefetchAlbedo(const TrianglePoint& point) const {
-  const Material& m = material(point.primitive->material);
-  if (const Texture* texture = colorTexture(point.primitive->material))
-    texture->prefetch(m.baseColorMap, uvAt(point, m.baseColorMap.uvSet));
+Vec3 Materials::albedo(const AlbedoLookup& lookup) {
+  const Vec3 color =
+      lookup.texture != nullptr ? lookup.factor * Vec3(lookup.texture->sample(lookup.at)) : lookup.factor;
+  return glm::clamp(color, Vec3(0.0f), Vec3(1.0f));
 }
 
 Vec3 Materials::emission(const TrianglePoint& point) const {
@@ -96,7 +112,7 @@ Vec3 Materials::emission(const TrianglePoint& point) const {
   Vec3 radiance = glm::max(m.emission, Vec3(0.0f));
   if (m.emissionMap && static_cast<std::size_t>(m.emissionMap.image) < srgbByImage_.size()) {
     if (const auto& texture = srgbByImage_[static_cast<std::size_t>(m.emissionMap.image)])
-      radiance *= Vec3(texture->sample(m.emissionMap, uvAt(point, m.emissionMap.uvSet)));
+      radiance *= Vec3(texture->finest().sample(m.emissionMap, uvAt(point, m.emissionMap.uvSet)));
   }
   return radiance;
 }
@@ -104,8 +120,8 @@ Vec3 Materials::emission(const TrianglePoint& point) const {
 float Materials::alpha(const TrianglePoint& point) const {
   const Material& m = material(point.primitive->material);
   float a = m.baseColor.w;
-  if (const Texture* texture = colorTexture(point.primitive->material))
-    a *= texture->sampleAlpha(m.baseColorMap, uvAt(point, m.baseColorMap.uvSet));
+  if (const TexturePyramid* textures = colorTexture(point.primitive->material))
+    a *= textures->finest().sampleAlpha(m.baseColorMap, uvAt(point, m.baseColorMap.uvSet));
   if (!point.primitive->colors.empty()) a *= interpolate(point, point.primitive->colors).w;
   return a;
 }
@@ -118,8 +134,8 @@ float Materials::opacity(const TrianglePoint& point) const {
 bool Materials::needsAlphaTest(const Primitive& primitive) const {
   const Material& m = material(primitive.material);
   if (m.alphaMode == AlphaMode::Opaque) return false;
-  const Texture* texture = colorTexture(primitive.material);
-  if ((texture && !texture->opaque()) || hasPartialVertexAlpha(primitive)) return true;
+  const TexturePyramid* textures = colorTexture(primitive.material);
+  if ((textures && !textures->finest().opaque()) || hasPartialVertexAlpha(primitive)) return true;
   const float whole = applyAlphaMode(m, m.baseColor.w);
   return whole > 0.0f && whole < 1.0f;
 }

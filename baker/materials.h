@@ -29,13 +29,25 @@ class Materials {
   const Material& material(int index) const { return scene_->materials[static_cast<std::size_t>(index)]; }
 
   /// Share of light reflected, 0..1: base colour times texture times vertex colour.
-  Vec3 albedo(const TrianglePoint& point) const;
+  Vec3 albedo(const TrianglePoint& point) const { return albedo(findAlbedo(point)); }
+  /// In two steps, to ask memory for what the second will read.
+  struct AlbedoLookup {
+    Vec3 factor{0};
+    const Texture* texture = nullptr;
+    Texture::Footprint at{};
+
+    void prefetch() const {
+      if (texture != nullptr) texture->prefetch(at);
+    }
+  };
+  AlbedoLookup findAlbedo(const TrianglePoint& point) const { return findAlbedo(point, 0.0f); }
+  static Vec3 albedo(const AlbedoLookup& lookup);
+  /// Leads to the mean about the point over roughly `share` of its triangle's area, of the texture alone.
+  AlbedoLookup findAlbedo(const TrianglePoint& point, float share) const;
   /// Whether albedo() is the same on all of the primitive.
   bool hasOneAlbedo(const Primitive& primitive) const {
     return primitive.colors.empty() && colorTexture(primitive.material) == nullptr;
   }
-  /// Brings what albedo() will read closer; of no effect on results.
-  void prefetchAlbedo(const TrianglePoint& point) const;
   /// Radiance sent out from the front (and from the back where doubleSided): nits. Alpha is not applied.
   Vec3 emission(const TrianglePoint& point) const;
   /// 0..1: for MASK 0 or 1 (the cut-off applied), for BLEND the share of light that is held.
@@ -49,11 +61,11 @@ class Materials {
   bool invisible(const Primitive& primitive) const;
 
  private:
-  const Texture* colorTexture(int material) const;
+  const TexturePyramid* colorTexture(int material) const;
   float alpha(const TrianglePoint& point) const;
 
   const Scene* scene_;
-  std::vector<std::optional<Texture>> srgbByImage_;  // per Scene::images
+  std::vector<std::optional<TexturePyramid>> srgbByImage_;  // per Scene::images
 };
 
 /// Interpolated texture coordinates; (0, 0) where the primitive lacks the set.

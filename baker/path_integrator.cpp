@@ -205,7 +205,7 @@ void WaveTracer::findHits(int depth) {
     if (rays_.hit(lane)) hits_[static_cast<std::size_t>(lane)] = transport_.rays.surfaceAt(rays_, lane);
   if (depth == options_.bounces) return;
   for (int lane = 0; lane < kLanes; ++lane)
-    if (rays_.hit(lane)) transport_.materials.prefetchAlbedo(hits_[static_cast<std::size_t>(lane)].point);
+    if (rays_.hit(lane)) transport_.materials.findAlbedo(hits_[static_cast<std::size_t>(lane)].point).prefetch();
 }
 
 /// What the ray in flight found: adds what shines by itself. Returns whether the path goes on from there; then

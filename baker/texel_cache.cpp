@@ -116,11 +116,11 @@ void TexelMap::addSurface(std::uint32_t part, const Surface& surface) {
   }
 }
 
-void TexelMap::setUneven(std::span<const std::uint8_t> values, std::uint8_t least) {
+void TexelMap::setUneven(std::span<const std::uint8_t> uneven) {
   for (std::size_t p = 0; p < texels_.size(); ++p)
     for (std::size_t i = 0; i < texels_[p].size(); ++i) {
       const TexelCoord c = texels_[p].coords[i];
-      if (values[firstOfPage_[p] + i] >= least)
+      if (uneven[firstOfPage_[p] + i])
         tiles_[tileOf(pages_[p + 1], c.x, c.y)].bits |= 1u << (kTileTexels + tileBit(c.x, c.y));
     }
 }

@@ -42,8 +42,8 @@ class TexelMap {
 
   /// Hits that are nearer than so many of their texels: one value for a whole texel is too coarse for them.
   static constexpr float kNearTexels = 0.5f;
-  /// From now on hits on texels whose value, one for each, is `least` or more are too coarse from afar, too.
-  void setUneven(std::span<const std::uint8_t> values, std::uint8_t least);
+  /// `uneven`: one for each texel; from now on hits on those that are not 0 are too coarse from afar, too.
+  void setUneven(std::span<const std::uint8_t> uneven);
 
   /// For each texel that is `wanting` and not `valid`: the nearest valid one of the same chart, within kReach texels;
   /// pairs of (texel, source) in the order of texels. Texels without such a neighbour are left out.

@@ -26,6 +26,41 @@ const Table& tableOf(ColorSpace space) {
   return space == ColorSpace::Srgb ? srgb : linear;
 }
 
+/// The byte whose linear value is nearest.
+std::uint8_t encodeSrgb(float linear) {
+  constexpr float kSteps = 65535.0f;
+  static const std::vector<std::uint8_t> nearest = [] {
+    const Table& values = tableOf(ColorSpace::Srgb);
+    std::vector<std::uint8_t> made;
+    for (std::size_t byte = 0; made.size() <= static_cast<std::size_t>(kSteps);
+         made.push_back(static_cast<std::uint8_t>(byte)))
+      while (byte < 255 && static_cast<float>(made.size()) / kSteps > 0.5f * (values[byte] + values[byte + 1])) ++byte;
+    return made;
+  }();
+  return nearest[static_cast<std::size_t>(std::clamp(linear, 0.0f, 1.0f) * kSteps + 0.5f)];
+}
+
+/// The texels of a finer level that one of a coarser level covers along an axis, the outer ones in part.
+struct Covered {
+  int first = 0;
+  int count = 0;
+  std::array<float, 3> shares{};
+};
+
+/// Texel i of n covers i * size / n to (i + 1) * size / n; size < 3 n, or n = 1.
+std::vector<Covered> coveredBy(int n, int size) {
+  std::vector<Covered> all(static_cast<std::size_t>(n));
+  for (std::int64_t i = 0; i < n; ++i) {
+    Covered& covered = all[static_cast<std::size_t>(i)];
+    const std::int64_t begin = i * size, end = begin + size;  // times n
+    covered.first = static_cast<int>(begin / n);
+    for (std::int64_t source = covered.first; source * n < end; ++source)
+      covered.shares[static_cast<std::size_t>(covered.count++)] =
+          static_cast<float>(std::min((source + 1) * n, end) - std::max(source * n, begin)) / static_cast<float>(size);
+  }
+  return all;
+}
+
 /// Texel index for a coordinate that may lie outside the image.
 int wrapTexel(std::int64_t i, int size, Wrap mode) {
   const std::int64_t n = size;
@@ -136,9 +171,7 @@ Texture::Footprint Texture::footprint(const TextureRef& ref, Vec2 uv) const {
   return at;
 }
 
-Vec4 Texture::sample(const TextureRef& ref, Vec2 uv) const {
-  const Footprint at = footprint(ref, uv);
-  if (ref.nearest) return fetch(at.columns[0], at.rows[0]);
+Vec4 Texture::sample(const Footprint& at) const {
   const auto row = [&](int y) { return glm::mix(fetch(at.columns[0], y), fetch(at.columns[1], y), at.fx); };
   return glm::mix(row(at.rows[0]), row(at.rows[1]), at.fy);
 }
@@ -158,15 +191,28 @@ float Texture::sampleAlpha(const TextureRef& ref, Vec2 uv) const {
   return glm::mix(row(at.rows[0]), row(at.rows[1]), at.fy);
 }
 
-void Texture::prefetch(const TextureRef& ref, Vec2 uv) const {
-  // Of the footprint's two rows, the left texels: the right ones mostly share their cache lines.
-  const Footprint at = footprint(ref, uv);
+void Texture::prefetch(const Footprint& at) const {
+  // Of the two rows, the left texels: the right ones mostly share their cache lines.
   for (const int y : at.rows) {
     const std::size_t texel = texelAt(at.columns[0], y);
     if (bytes_.empty())
       __builtin_prefetch(&floats_[4 * texel]);
     else
       __builtin_prefetch(&bytes_[3 * texel]);
+  }
+}
+
+/// Rounded where the texture holds bytes.
+void Texture::set(int x, int y, const Vec4& rgba) {
+  const std::size_t texel = texelAt(x, y);
+  for (int c = 0; c < 4; ++c) {
+    const auto channel = static_cast<std::size_t>(c);
+    if (bytes_.empty())
+      floats_[4 * texel + channel] = rgba[c];
+    else if (c < 3 || !alphaBytes_.empty())
+      byteOf(texel, channel) = space_ == ColorSpace::Srgb && c < 3
+                                   ? encodeSrgb(rgba[c])
+                                   : static_cast<std::uint8_t>(std::lround(255.0f * std::clamp(rgba[c], 0.0f, 1.0f)));
   }
 }
 
@@ -180,49 +226,50 @@ Texture Texture::halved() const {
   half.floats_.resize(bytes_.empty() ? 4 * texels : 0);
   half.bytes_.resize(bytes_.empty() ? 0 : 3 * texels);
   half.alphaBytes_.resize(alphaBytes_.empty() ? 0 : texels);
-  // Texel i of n covers source texels i * size / n to (i + 1) * size / n, whose ends may lie inside one.
-  const auto share = [](std::int64_t source, std::int64_t i, std::int64_t n, std::int64_t size) {
-    return static_cast<float>(std::min((source + 1) * n, (i + 1) * size) - std::max(source * n, i * size)) /
-           static_cast<float>(size);
-  };
-  const auto first = [](std::int64_t i, std::int64_t n, std::int64_t size) { return static_cast<int>(i * size / n); };
-  const auto end = [](std::int64_t i, std::int64_t n, std::int64_t size) {
-    return static_cast<int>(((i + 1) * size + n - 1) / n);
-  };
-  for (int y = 0; y < half.height_; ++y)
+  const std::vector<Covered> columns = coveredBy(half.width_, width_);
+  const std::vector<Covered> rows = coveredBy(half.height_, height_);
+  for (int y = 0; y < half.height_; ++y) {
+    const Covered& down = rows[static_cast<std::size_t>(y)];
+    // What rounding to bytes takes from one texel the next one gets: else each level would be .1% brighter or darker.
+    Vec4 owed(0.0f);
     for (int x = 0; x < half.width_; ++x) {
+      const Covered& across = columns[static_cast<std::size_t>(x)];
       Vec4 mean(0.0f);
-      for (int v = first(y, half.height_, height_); v < end(y, half.height_, height_); ++v)
-        for (int u = first(x, half.width_, width_); u < end(x, half.width_, width_); ++u)
-          mean += share(u, x, half.width_, width_) * share(v, y, half.height_, height_) * fetch(u, v);
-      const std::size_t texel = half.texelAt(x, y);
-      for (int c = 0; c < 4; ++c) {
-        if (bytes_.empty())
-          half.floats_[4 * texel + static_cast<std::size_t>(c)] = mean[c];
-        else if (c < 3 || !alphaBytes_.empty())
-          half.byteOf(texel, static_cast<std::size_t>(c)) = static_cast<std::uint8_t>(std::lround(
-              255.0f * std::clamp(space_ == ColorSpace::Srgb && c < 3 ? linearToSrgb(mean[c]) : mean[c], 0.0f, 1.0f)));
-      }
+      for (int v = 0; v < down.count; ++v)
+        for (int u = 0; u < across.count; ++u)
+          mean += across.shares[u] * down.shares[v] * fetch(across.first + u, down.first + v);
+      owed += mean;
+      half.set(x, y, owed);
+      owed -= half.fetch(x, y);
     }
+  }
   return half;
 }
 
-TexturePyramid::TexturePyramid(Texture finest) {
+TexturePyramid::TexturePyramid(Texture finest, bool coarser) {
   levels_.push_back(std::move(finest));
-  while (levels_.back().width() > 1 || levels_.back().height() > 1) levels_.push_back(levels_.back().halved());
+  while (coarser && (levels_.back().width() > 1 || levels_.back().height() > 1))
+    levels_.push_back(levels_.back().halved());
 }
 
-Vec4 TexturePyramid::sample(const TextureRef& ref, Vec2 uv, float uvWidth) const {
+float TexturePyramid::exactLevel(const TextureRef& ref, float uvWidth) const {
   const Texture& finest = levels_.front();
   const float stretch = std::sqrt(std::abs(glm::determinant(glm::mat2(ref.uvMatrix))));
   const float texels =
       uvWidth * stretch * std::sqrt(static_cast<float>(finest.width()) * static_cast<float>(finest.height()));
-  if (!(texels > 1.0f)) return finest.sample(ref, uv);
-  const float level = std::min(std::log2(texels), static_cast<float>(levels_.size() - 1));
+  return texels > 1.0f ? std::min(std::log2(texels), static_cast<float>(levels_.size() - 1)) : 0.0f;
+}
+
+const Texture& TexturePyramid::level(const TextureRef& ref, float uvWidth) const {
+  return levels_[static_cast<std::size_t>(exactLevel(ref, uvWidth) + 0.5f)];
+}
+
+Vec4 TexturePyramid::sample(const TextureRef& ref, Vec2 uv, float uvWidth) const {
+  const float level = exactLevel(ref, uvWidth);
   const auto low = static_cast<std::size_t>(level);
+  const float between = level - static_cast<float>(low);
   const Vec4 finer = levels_[low].sample(ref, uv);
-  if (low + 1 == levels_.size()) return finer;
-  return glm::mix(finer, levels_[low + 1].sample(ref, uv), level - static_cast<float>(low));
+  return between > 0.0f ? glm::mix(finer, levels_[low + 1].sample(ref, uv), between) : finer;
 }
 
 }  // namespace lumel

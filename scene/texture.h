@@ -26,30 +26,32 @@ class Texture {
 
   /// Linear RGBA of texel (x, y), rows from the top; coordinates must be in range.
   Vec4 fetch(int x, int y) const;
-  /// Bilinear (or nearest, as ref says) with wrap modes at ref.uvMatrix * uv; texel centres at (i + 0.5) / size.
-  Vec4 sample(const TextureRef& ref, Vec2 uv) const;
-  /// The fourth component of sample() alone.
-  float sampleAlpha(const TextureRef& ref, Vec2 uv) const;
-  /// The next level of a mip chain: half as wide and high (at least 1), each texel the mean, of linear values, of what
-  /// it covers. An 8-bit image stays one.
-  Texture halved() const;
-  /// Asks the processor to bring the texels that sample() will read closer. No effect on any result.
-  void prefetch(const TextureRef& ref, Vec2 uv) const;
-
- private:
-  /// What sample() reads: four texels, and how far between them.
+  /// What a lookup reads: four texels, and how far between them.
   struct Footprint {
     int columns[2];
     int rows[2];
     float fx = 0.0f;
     float fy = 0.0f;
   };
+  /// Of a bilinear lookup (or nearest, as ref says) with wrap modes at ref.uvMatrix * uv; texel centres at
+  /// (i + 0.5) / size.
+  Footprint footprint(const TextureRef& ref, Vec2 uv) const;
+  Vec4 sample(const Footprint& at) const;
+  Vec4 sample(const TextureRef& ref, Vec2 uv) const { return sample(footprint(ref, uv)); }
+  /// The fourth component of sample() alone.
+  float sampleAlpha(const TextureRef& ref, Vec2 uv) const;
+  /// The next level of a mip chain: half as wide and high (at least 1), each texel the mean, of linear values, of what
+  /// it covers. An 8-bit image stays one.
+  Texture halved() const;
+  /// Asks the processor to bring the texels that sample() will read closer. No effect on any result.
+  void prefetch(const Footprint& at) const;
+
+ private:
   /// What a block of kBlock x kBlock texels holds, as bits: so small a table stays in a processor's cache, and most of
   /// what a cut-out is asked for lies in blocks of one kind.
   enum AlphaKind : std::uint8_t { kSomeTransparent = 1, kSomeVisible = 2 };
   static constexpr int kBlock = 8;
 
-  Footprint footprint(const TextureRef& ref, Vec2 uv) const;
   float fetchAlpha(int x, int y) const;
   std::size_t texelAt(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
@@ -61,6 +63,7 @@ class Texture {
   std::uint8_t& byteOf(std::size_t texel, std::size_t channel) {
     return channel < 3 ? bytes_[3 * texel + channel] : alphaBytes_[texel];
   }
+  void set(int x, int y, const Vec4& rgba);
   void sortAlpha();
 
   int width_ = 0;
@@ -76,14 +79,19 @@ class Texture {
 /// A texture and its mip chain (Williams 1983), for lookups where a texel is small in the picture.
 class TexturePyramid {
  public:
-  explicit TexturePyramid(Texture finest);
+  /// `coarser` false: sample() and level() know the finest alone.
+  explicit TexturePyramid(Texture finest, bool coarser = true);
 
   const Texture& finest() const { return levels_.front(); }
   /// Mean about `uv` over roughly `uvWidth` on a side, in the units of `uv`, before ref.uvMatrix: between the two
   /// levels whose texels are about as wide. 0 is finest().sample().
   Vec4 sample(const TextureRef& ref, Vec2 uv, float uvWidth) const;
+  /// The one of these two levels that is nearer.
+  const Texture& level(const TextureRef& ref, float uvWidth) const;
 
  private:
+  float exactLevel(const TextureRef& ref, float uvWidth) const;
+
   std::vector<Texture> levels_;  // the last is one texel
 };
 

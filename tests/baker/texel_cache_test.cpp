@@ -50,7 +50,7 @@ void expectTexelsUnderHits(bool placedByEmbree) {
   ASSERT_LT(mapped.texels[1].size(), 40u);
   std::vector<std::uint8_t> uneven(mapped.map->size());
   for (std::size_t t = 0; t < uneven.size(); t += 3) uneven[t] = 1;
-  mapped.map->setUneven(uneven, 1);
+  mapped.map->setUneven(uneven);
   std::map<std::string, int> seen;
   for (std::uint32_t p = 0; p < 200; ++p) {
     RayPacket packet;

@@ -63,16 +63,16 @@ struct Fixture {
   /// As the warm-up of a bake does.
   void findUneven() {
     const PageTexels& page = transport.texels[0];
-    std::vector<std::uint8_t> shut(page.size());
+    std::vector<std::uint8_t> uneven(page.size());
     std::array<CacheLink, std::size_t{kLanes} * GatherWave::kWarmRays> links;
     for (std::size_t first = 0; first < page.size(); first += kLanes) {
       const std::size_t count = std::min<std::size_t>(kLanes, page.size() - first);
       GatheredWave counts;
       const auto warm =
           GatherWave(scene, 0, first, count).warmUp(std::span(links).first(count * GatherWave::kWarmRays), counts);
-      for (std::size_t i = 0; i < count; ++i) shut[first + i] = static_cast<std::uint8_t>(warm[i].shut());
+      for (std::size_t i = 0; i < count; ++i) uneven[first + i] = warm[i].isUneven() ? 1 : 0;
     }
-    map.setUneven(shut, WarmTexel::kShut);
+    map.setUneven(uneven);
   }
   std::size_t pixelOf(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(transport.texels[0].width) +
