@@ -173,7 +173,7 @@ void EnvironmentLight::splitOffSun(std::vector<float>& luminances) {
 /// The table of what is left.
 void EnvironmentLight::addSky(const std::vector<float>& luminances) {
   const auto rows = static_cast<std::size_t>(grid_.rows), columns = static_cast<std::size_t>(grid_.columns);
-  columns_ = Distribution(luminances, rows);
+  columns_ = DistributionRows(luminances, rows);
   std::vector<float> rowWeights(rows);
   for (std::size_t row = 0; row < rows; ++row)
     rowWeights[row] = static_cast<float>(columns_.total(row)) * solidAngle(row * columns);
@@ -282,7 +282,7 @@ void EnvironmentLight::take(const Places& places, LightSampleLanes& samples) con
 
 void EnvironmentLight::sampleSun(const UnitSquareLanes& u, LightSampleLanes& samples) const {
   Distribution::Lanes chosen;
-  sun_.choose(u.x, {}, chosen);
+  sun_.choose(u.x, chosen);
   Places places;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     places.cell[lane] = sunCells_[static_cast<std::size_t>(chosen.index[lane])];
@@ -296,7 +296,7 @@ void EnvironmentLight::sampleSun(const UnitSquareLanes& u, LightSampleLanes& sam
 
 void EnvironmentLight::sampleSky(const UnitSquareLanes& u, LightSampleLanes& samples) const {
   Distribution::Lanes row, column;
-  rows_.choose(u.y, {}, row);
+  rows_.choose(u.y, row);
   Places places;
   std::copy(std::begin(row.index), std::end(row.index), places.row.begin());
   columns_.choose(u.x, places.row, column);

@@ -21,7 +21,7 @@ class EnvironmentLight {
  public:
   EnvironmentLight() = default;
   /// Builds tables for sampling only from an image: a constant sky is met well enough by the directions that a surface
-  /// gathers from, and a black one costs nothing. Memory: 24 bytes per cell.
+  /// gathers from, and a black one costs nothing. Memory: 18 bytes per cell.
   explicit EnvironmentLight(const Environment& environment);
 
   /// How many cells stand for an image; one for none.
@@ -92,7 +92,7 @@ class EnvironmentLight {
   std::vector<Cell> cells_;      // [rows][columns]; one for a constant sky
   std::vector<float> versines_;  // [rows + 1]: 1 - cos of the polar angle (from +y) of the rows' borders
   Distribution rows_;
-  Distribution columns_;                // per row
+  DistributionRows columns_;            // per row
   std::vector<std::int32_t> sunCells_;  // ascending
   Distribution sun_;                    // over sunCells_
 };

@@ -29,7 +29,7 @@ constexpr double kSamplingPerTriangle = 200.0;
 constexpr double kFinishingPerTriangle = 150.0;
 constexpr double kPerDecodedTexel = 4.0;
 constexpr double kPerSkyPixel = 12.0;
-constexpr double kPerSkyCell = 24.0;
+constexpr double kPerSkyCell = 18.0;
 
 }  // namespace
 

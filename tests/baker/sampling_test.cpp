@@ -142,38 +142,82 @@ TEST(Distribution, RestReusesTheNumber) {
   EXPECT_LT(d.rest(0x1.fffffep-1f, 1), 1.0f);
 }
 
-// Rows of 1000 weights, not a power of two, so that u times their number is rounded; the last u is the one that would
-// round up to 1000. What is chosen holds u, from any row, and lanes give what single numbers do.
-TEST(Distribution, RowsSideBySide) {
-  constexpr std::size_t kSize = 1000, kRows = 3;
-  std::vector<float> weights(kSize * kRows);
-  for (std::size_t i = 0; i < kSize; ++i) {
-    weights[i] = 1.0f;
-    weights[kSize + i] = i < 900 ? 1e-9f : 1.0f;  // most of a guide's places point to the end
-    weights[2 * kSize + i] = 0.0f;
-  }
-  const Distribution d(weights, kRows);
-  EXPECT_TRUE(d.empty(2) && !d.empty(1) && d.empty(3));
-  for (std::uint32_t i = 0; i < 4096; ++i) {
-    std::array<float, kLanes> u;
-    LaneFlags rows;
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      u[lane] = sobol1D(i * kLanes + static_cast<std::uint32_t>(lane), 3);
-      rows[lane] = static_cast<int>(lane % 2);
+// 1000 weights, not a power of two, so that u times their number is rounded; the last u is the one that would round up
+// to 1000. What is chosen holds u, and lanes give what single numbers do.
+TEST(Distribution, LanesChooseWhatHoldsTheirNumber) {
+  for (const float few : {1.0f, 1e-9f}) {  // in the second most of a guide's places point to the end
+    std::vector<float> weights(1000, 1.0f);
+    std::fill(weights.begin(), weights.begin() + 900, few);
+    const Distribution d(weights);
+    for (std::uint32_t i = 0; i < 4096; ++i) {
+      std::array<float, kLanes> u;
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        u[lane] = sobol1D(i * kLanes + static_cast<std::uint32_t>(lane), 3);
+      if (i == 0) u[0] = 0.0f;
+      if (i == 1) u[0] = 0x1.fffffep-1f;
+      Distribution::Lanes chosen;
+      d.choose(u.data(), chosen);
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        const std::size_t index = d.choose(u[lane]);
+        ASSERT_EQ(static_cast<std::size_t>(chosen.index[lane]), index);
+        EXPECT_EQ(chosen.rest[lane], d.rest(u[lane], index));
+        float before = 0.0f;  // sums of multiples of 2^-24 are exact
+        for (std::size_t k = 0; k < index; ++k) before += d.probability(k);
+        ASSERT_LE(before, u[lane]);
+        ASSERT_LT(u[lane], before + d.probability(index));
+      }
     }
-    if (i == 0) u[0] = u[1] = 0.0f;
-    if (i == 1) u[0] = u[1] = 0x1.fffffep-1f;
-    Distribution::Lanes chosen;
-    d.choose(u.data(), rows, chosen);
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      const auto row = static_cast<std::size_t>(rows[lane]);
-      const std::size_t index = d.choose(u[lane], row);
-      ASSERT_EQ(static_cast<std::size_t>(chosen.index[lane]), index);
-      EXPECT_EQ(chosen.rest[lane], d.rest(u[lane], index, row));
-      float before = 0.0f;  // sums of multiples of 2^-24 are exact
-      for (std::size_t k = 0; k < index; ++k) before += d.probability(k, row);
-      ASSERT_LE(before, u[lane]);
-      ASSERT_LT(u[lane], before + d.probability(index, row));
+  }
+}
+
+// Rows of any length that a table may have: every step of the grid is chosen by the index that holds it, the rest of u
+// goes from 0 to 1 within, and shares are as close to the weights as promised.
+TEST(DistributionRows, ProbabilityIsExactlyTheShareOfChoices) {
+  for (const std::size_t size : {std::size_t{1}, std::size_t{7}, std::size_t{512}, std::size_t{1000}, std::size_t{2048},
+                                 DistributionRows::kMostWeights}) {
+    constexpr std::size_t kRows = 5;
+    std::vector<float> weights(kRows * size);
+    for (std::uint32_t i = 0; i < size; ++i) {
+      weights[i] = 1.0f;
+      weights[size + i] = unitFloat(hashCombine(i, 7));
+      weights[2 * size + i] = i + 1 == size ? 1.0f : 1e-12f;
+      weights[3 * size + i] = i % 3 == 1 || size == 1 ? 1.0f : 0.0f;  // nothing at the ends
+      weights[4 * size + i] = -1.0f;
+    }
+    const DistributionRows d(weights, kRows);
+    EXPECT_TRUE(d.empty(4));
+    for (std::size_t row = 0; row < 4; ++row) {
+      float whole = 0.0f;
+      for (std::size_t i = 0; i < size; ++i) {
+        const float weight = weights[row * size + i], share = d.probability(i, row);
+        whole += share;
+        ASSERT_EQ(share > 0.0f, weight > 0.0f);
+        const float due = weight / static_cast<float>(d.total(row));
+        ASSERT_NEAR(share, due, 0x1p-15f * (1.001f + static_cast<float>(size) * due)) << size << ' ' << row << ' ' << i;
+      }
+      ASSERT_EQ(whole, 1.0f);
+      LaneFlags rows;
+      rows.fill(static_cast<int>(row));
+      std::vector<int> counts(size);
+      float restBefore = 0.0f;
+      int before = 0;
+      for (std::uint32_t k = 0; k < (1u << 16); k += kLanes) {
+        std::array<float, kLanes> u;
+        for (std::uint32_t lane = 0; lane < kLanes; ++lane) u[lane] = static_cast<float>(k + lane) * 0x1p-16f;
+        Distribution::Lanes chosen;
+        d.choose(u.data(), rows, chosen);
+        for (std::size_t lane = 0; lane < kLanes; ++lane) {
+          ++counts[static_cast<std::size_t>(chosen.index[lane])];
+          ASSERT_GE(chosen.index[lane], before);
+          if (chosen.index[lane] != before) restBefore = 0.0f;
+          ASSERT_GE(chosen.rest[lane], restBefore);
+          ASSERT_LT(chosen.rest[lane], 1.0f);
+          before = chosen.index[lane];
+          restBefore = chosen.rest[lane];
+        }
+      }
+      for (std::size_t i = 0; i < size; ++i)
+        ASSERT_EQ(static_cast<float>(counts[i]) * 0x1p-16f, d.probability(i, row)) << size << ' ' << row << ' ' << i;
     }
   }
 }
