@@ -62,28 +62,22 @@ float meanEmission(const Materials& materials, const Primitive& primitive, std::
 
 /// The emitters that the lanes chose, by what sampling needs of them.
 struct alignas(64) EmissiveTriangles::Chosen {
-  Vec3Lanes corner, e1, e2, ng, radiance;
+  // As an emitter begins.
+  Vec3Lanes corner;
   float doubleArea[kLanes] = {};
-  float offsetMeters[kLanes] = {};
+  Vec3Lanes e1;
+  float luminance[kLanes] = {};
+  Vec3Lanes e2;
   float back[kLanes] = {};
+  Vec3Lanes ng;
+  float offsetMeters[kLanes] = {};
+  Vec3Lanes radiance;
+
   float probability[kLanes] = {};  // 0: nothing was chosen
   std::uint32_t triangle[kLanes] = {};
   // The point on each.
   float x[kLanes];
   float y[kLanes];
-
-  void set(std::size_t lane, const Emitter& emitter, const LightTree::Choice& choice) {
-    corner.set(lane, emitter.corner);
-    e1.set(lane, emitter.e1);
-    e2.set(lane, emitter.e2);
-    ng.set(lane, emitter.ng);
-    radiance.set(lane, emitter.radiance);
-    doubleArea[lane] = emitter.doubleArea;
-    offsetMeters[lane] = emitter.offsetMeters;
-    back[lane] = emitter.back;
-    probability[lane] = choice.probability;
-    triangle[lane] = choice.light;
-  }
 };
 
 EmissiveTriangles::EmissiveTriangles(RayScene& rays, const Materials& materials)
@@ -190,6 +184,44 @@ LUMEL_FOR_EACH_CPU void EmissiveTriangles::chooseAmongFew(std::span<const Emitte
     chosen.probability[lane] = taken[lane] / pick(total[lane] > 0.0f, total[lane], 1.0f);
 }
 
+/// The same among the lights of each lane's leaf.
+LUMEL_FOR_EACH_CPU void EmissiveTriangles::chooseInLeaves(const Emitter* triangles,
+                                                          const std::array<LaneFlags, LightTree::kLeaf>& lights,
+                                                          const LightTree::Descent& descent, const Vec3Lanes& p,
+                                                          Chosen& chosen) {
+  LaneFlags at;
+  alignas(64) float each[LightTree::kLeaf][kLanes];
+  alignas(64) float total[kLanes] = {};
+  for (std::size_t k = 0; k < LightTree::kLeaf; ++k) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) at[lane] = lights[k][lane] < 0 ? 0 : lights[k][lane];
+    turnRecords(triangles, at, &chosen);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const Vec3 a = chosen.corner[lane] - p[lane];
+      const float seen = volumeOf(a, chosen.ng[lane], chosen.doubleArea[lane], chosen.back[lane]);
+      const float importance = importanceOf(a, chosen.e1[lane], chosen.e2[lane], seen, chosen.luminance[lane]);
+      each[k][lane] = pick(lights[k][lane] >= 0, importance, 0.0f);
+      total[lane] += each[k][lane];
+    }
+  }
+  alignas(64) float before[kLanes] = {};
+  alignas(64) float taken[kLanes] = {};
+  at.fill(0);
+  for (std::size_t k = 0; k < LightTree::kLeaf; ++k)
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const float target = static_cast<float>(descent.rest[lane]) * total[lane];
+      const bool takes = (each[k][lane] > 0.0f) & !((taken[lane] > 0.0f) & (target < before[lane]));
+      before[lane] += each[k][lane];
+      taken[lane] = pick(takes, each[k][lane], taken[lane]);
+      at[lane] = takes ? lights[k][lane] : at[lane];
+    }
+  turnRecords(triangles, at, &chosen);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const float share = taken[lane] / pick(total[lane] > 0.0f, total[lane], 1.0f);
+    chosen.probability[lane] = descent.probability[lane] * share;
+    chosen.triangle[lane] = static_cast<std::uint32_t>(at[lane]);
+  }
+}
+
 /// Points on the chosen triangles, and what they send to p.
 LUMEL_FOR_EACH_CPU void EmissiveTriangles::samplePoints(const Vec3Lanes& p, const UnitSquareLanes& u, Chosen& chosen,
                                                         LightSampleLanes& samples) {
@@ -254,13 +286,12 @@ void EmissiveTriangles::sample(const Vec3Lanes& p, const LaneFlags& active, cons
     chooseAmongFew(few_, p, uTriangle, chosen);
   } else {
     LightTree::Descent descent;
-    tree_.descend(p, Vec3Lanes(), active, uTriangle.u, descent);
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      const Vec3 at = p[lane];
-      const LightTree::Choice choice =
-          tree_.chooseInLeaf(descent, lane, [&](std::uint32_t triangle) { return importance(triangle, at); });
-      if (choice.probability > 0.0f) chosen.set(lane, triangles_[choice.light], choice);
-    }
+    tree_.descend(p, nullptr, active, uTriangle.u, descent);
+    std::array<LaneFlags, LightTree::kLeaf> lights;
+    tree_.lightsOf(descent, lights);
+    chooseInLeaves(triangles_.data(), lights, descent, p, chosen);
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      chosen.radiance.set(lane, triangles_[chosen.triangle[lane]].radiance);
   }
   samplePoints(p, uPoint, chosen, samples);
   if (uniform_) return;

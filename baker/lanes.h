@@ -103,4 +103,20 @@ template <int Count, class Row>
   }
 }
 
+/// The first Count words of the record that each lane names, as Count rows of lanes from `lanes` on.
+template <int Count = kLanes, class Record>
+[[gnu::always_inline]] inline void turnRecords(const Record* records, const LaneFlags& which, void* lanes) {
+  static_assert(sizeof(Record) >= 4 * Count);
+  constexpr int kPart = Count < 8 ? Count : 8;
+  for (std::size_t first = 0; first < Count; first += kPart) {
+    std::array<LaneWords, kPart> columns;
+    turnRows<kPart>(
+        [&](std::size_t lane) {
+          return reinterpret_cast<const std::byte*>(records + which[lane]) + first * sizeof(std::uint32_t);
+        },
+        columns);
+    std::memcpy(static_cast<std::byte*>(lanes) + first * sizeof(LaneWords), columns.data(), sizeof columns);
+  }
+}
+
 }  // namespace lumel

@@ -132,16 +132,20 @@ Split bestSplit(std::span<const LightBounds> lights, std::span<const std::uint32
 
 }  // namespace
 
-double refine(float u, const Vec3& p) {
+[[gnu::always_inline]] static inline double refined(float u, const Vec3& p) {
   std::uint32_t bits = hashBits(std::bit_cast<std::uint32_t>(u));
-  for (int i = 0; i < 3; ++i) bits = hashCombine(bits, std::bit_cast<std::uint32_t>(p[i]));
+  bits = hashCombine(bits, std::bit_cast<std::uint32_t>(p.x));
+  bits = hashCombine(bits, std::bit_cast<std::uint32_t>(p.y));
+  bits = hashCombine(bits, std::bit_cast<std::uint32_t>(p.z));
   return static_cast<double>(u) + static_cast<double>(bits) * 0x1p-56;
 }
+double refine(float u, const Vec3& p) { return refined(u, p); }
 
 LightTree::LightTree(std::span<const LightBounds> lights) {
   leafOf_.assign(lights.size(), kNone);
   for (std::uint32_t i = 0; i < lights.size(); ++i)
     if (lights[i].power > 0.0f && std::isfinite(lights[i].power)) order_.push_back(i);
+  bounded_ = std::any_of(lights.begin(), lights.end(), [](const LightBounds& b) { return std::isfinite(b.reach); });
   if (!order_.empty()) build(lights, 0, order_.size(), kNone, 0);
 }
 
@@ -149,18 +153,19 @@ void LightTree::build(std::span<const LightBounds> lights, std::size_t first, st
                       int depth) {
   const auto at = static_cast<std::uint32_t>(nodes_.size());
   nodes_.emplace_back().parent = parent;
+  groups_.emplace_back();
   const std::span<std::uint32_t> group = std::span(order_).subspan(first, count);
   LightBounds bounds;
   for (const std::uint32_t light : group) unite(bounds, lights[light]);
-  nodes_[at].group = {.centre = centreOf(bounds),
-                      .half = 0.5f * (bounds.max - bounds.min),
-                      .axis = bounds.axis,
-                      .radius2 = 0.25f * glm::dot(bounds.max - bounds.min, bounds.max - bounds.min),
-                      .cosSpread = bounds.cosSpread,
-                      .sinSpread = sineOf(bounds.cosSpread),
-                      .cosEmit = bounds.cosEmit,
-                      .power = bounds.power,
-                      .reach = bounds.reach};
+  groups_[at] = {.centre = centreOf(bounds),
+                 .radius2 = 0.25f * glm::dot(bounds.max - bounds.min, bounds.max - bounds.min),
+                 .axis = bounds.axis,
+                 .power = bounds.power,
+                 .half = 0.5f * (bounds.max - bounds.min),
+                 .reach = bounds.reach,
+                 .cosSpread = bounds.cosSpread,
+                 .sinSpread = sineOf(bounds.cosSpread),
+                 .cosEmit = bounds.cosEmit};
   if (count <= kLeaf) {
     nodes_[at].first = static_cast<std::uint32_t>(first);
     nodes_[at].count = static_cast<std::uint32_t>(count);
@@ -178,17 +183,14 @@ void LightTree::build(std::span<const LightBounds> lights, std::size_t first, st
   // All in one place, or borders lost to rounding.
   if (left == 0 || left == count) left = count / 2;
   build(lights, first, left, at, depth + 1);
-  nodes_[at].right = static_cast<std::uint32_t>(nodes_.size());
+  groups_[at].right = static_cast<int>(nodes_.size());
   build(lights, first + left, count - left, at, depth + 1);
 }
 
+template <bool kOpen>
 [[gnu::always_inline]] inline float LightTree::importanceOf(const Group& group, const LightQuery& query) {
   const Vec3 toCentre = group.centre - query.p;
   const float distance2 = glm::dot(toCentre, toCentre);
-  const auto beyond = [](float to, float half) { return pick(std::abs(to) > half, std::abs(to) - half, 0.0f); };
-  const Vec3 outside(beyond(toCentre.x, group.half.x), beyond(toCentre.y, group.half.y),
-                     beyond(toCentre.z, group.half.z));
-  const bool reaches = !(glm::dot(outside, outside) > group.reach * group.reach);
   // From inside of the bounding sphere lights may lie in any direction and shine from any side.
   const bool isOutside = distance2 > group.radius2;
   const float inside =
@@ -201,6 +203,11 @@ void LightTree::build(std::span<const LightBounds> lights, std::size_t first, st
   const float cosAxis = within(-glm::dot(group.axis, wi), -1.0f, 1.0f);
   const Angle off = lessened(lessened({cosAxis, sineOf(cosAxis)}, {group.cosSpread, group.sinSpread}), around);
   const float importance = pick(off.cosine > group.cosEmit, group.power * off.cosine * perDistance2, 0.0f);
+  if constexpr (kOpen) return pick(isOutside, importance * kAnySide, inside);
+  const auto beyond = [](float to, float half) { return pick(std::abs(to) > half, std::abs(to) - half, 0.0f); };
+  const Vec3 outside(beyond(toCentre.x, group.half.x), beyond(toCentre.y, group.half.y),
+                     beyond(toCentre.z, group.half.z));
+  const bool reaches = !(glm::dot(outside, outside) > group.reach * group.reach);
   const float cosTheta = within(glm::dot(query.n, wi), -1.0f, 1.0f);
   const float most = lessened({cosTheta, sineOf(cosTheta)}, around).cosine;
   // As for directions: the tilted basis vectors need light at grazing angles.
@@ -209,99 +216,107 @@ void LightTree::build(std::span<const LightBounds> lights, std::size_t first, st
   return pick(reaches, pick(isOutside, importance * pick(anySide, kAnySide, bySide), inside), 0.0f);
 }
 
-float LightTree::importance(const LightQuery& query) const {
-  return empty() ? 0.0f : importanceOf(nodes_[0].group, query);
-}
+float LightTree::importance(const LightQuery& query) const { return empty() ? 0.0f : importanceOf(groups_[0], query); }
 
 std::array<float, 2> LightTree::importancesBelow(std::uint32_t node, const LightQuery& query) const {
-  return {importanceOf(nodes_[node + 1].group, query), importanceOf(nodes_[nodes_[node].right].group, query)};
+  return {importanceOf(groups_[node + 1], query), importanceOf(groups_[rightOf(node)], query)};
 }
 
 struct alignas(64) LightTree::GroupLanes {
-  Vec3Lanes centre, half, axis;
-  float radius2[kLanes] = {};
-  float cosSpread[kLanes] = {};
-  float sinSpread[kLanes] = {};
-  float cosEmit[kLanes] = {};
-  float power[kLanes] = {};
-  float reach[kLanes] = {};
+  Vec3Lanes centre;
+  float radius2[kLanes];
+  Vec3Lanes axis;
+  float power[kLanes];
+  Vec3Lanes half;
+  float reach[kLanes];
+  float cosSpread[kLanes];
+  float sinSpread[kLanes];
+  float cosEmit[kLanes];
+  int right[kLanes];
 
-  void set(std::size_t lane, const Group& group) {
-    centre.set(lane, group.centre);
-    half.set(lane, group.half);
-    axis.set(lane, group.axis);
-    radius2[lane] = group.radius2;
-    cosSpread[lane] = group.cosSpread;
-    sinSpread[lane] = group.sinSpread;
-    cosEmit[lane] = group.cosEmit;
-    power[lane] = group.power;
-    reach[lane] = group.reach;
+  Group operator[](std::size_t lane) const {
+    return {centre[lane], radius2[lane],   axis[lane],      power[lane],   half[lane],
+            reach[lane],  cosSpread[lane], sinSpread[lane], cosEmit[lane], right[lane]};
   }
 };
 
-LUMEL_FOR_EACH_CPU void LightTree::importanceLanes(const GroupLanes& groups, const Vec3Lanes& p, const Vec3Lanes& n,
-                                                   float* importances) {
-#pragma GCC ivdep
+/// As choose(), for all lanes.
+template <bool kOpen>
+[[gnu::always_inline]] inline void LightTree::descendLanes(const Group* groups, const Vec3Lanes& p, const Vec3Lanes& n,
+                                                           const LaneFlags& active, const float* u, Descent& descent) {
+  static_assert(sizeof(GroupLanes) == kLanes * sizeof(Group));
+  LaneFlags goesOn, left, right;
+  const int rightOfRoot = groups[0].right;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const Group group{groups.centre[lane],  groups.half[lane],      groups.axis[lane],
-                      groups.radius2[lane], groups.cosSpread[lane], groups.sinSpread[lane],
-                      groups.cosEmit[lane], groups.power[lane],     groups.reach[lane]};
-    importances[lane] = importanceOf(group, {p[lane], n[lane]});
-  }
-}
-
-/// From a node to one of its children, the left of which follows it; as in choose().
-LUMEL_FOR_EACH_CPU void LightTree::stepDown(const float* left, const float* right, const LaneFlags& second,
-                                            LaneFlags& going, Descent& descent) {
-#pragma GCC ivdep
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const bool goes = going[lane] != 0;
-    const float total = left[lane] + right[lane];
-    const bool any = total > 0.0f;
-    const float share = left[lane] / pick(any, total, 1.0f);
-    const double rest = descent.rest[lane];
-    const auto border = static_cast<double>(share);
-    const bool toLeft = (rest < border) | !(right[lane] > 0.0f);
-    const double below = toLeft ? rest : rest - border;
-    const double width = toLeft ? border : 1.0 - border;
-    const double perWidth = below / width;
-    descent.rest[lane] = goes & any ? perWidth : rest;
-    const float stepped = descent.probability[lane] * pick(toLeft, share, 1.0f - share);
-    descent.probability[lane] = pick(goes, pick(any, stepped, 0.0f), descent.probability[lane]);
-    const int child = toLeft ? descent.leaf[lane] + 1 : second[lane];
-    descent.leaf[lane] = goes & any ? child : descent.leaf[lane];
-    going[lane] = goes & any ? 1 : 0;
-  }
-}
-
-void LightTree::descend(const Vec3Lanes& p, const Vec3Lanes& n, const LaneFlags& active, const float* u,
-                        Descent& descent) const {
-  LaneFlags going{};
-  const bool split = nodes_[0].count == 0;
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    descent.rest[lane] = split ? refine(u[lane], p[lane]) : static_cast<double>(u[lane]);
-    descent.probability[lane] = active[lane] ? 1.0f : 0.0f;
+    const double fine = refined(u[lane], p[lane]);
+    descent.rest[lane] = rightOfRoot != 0 ? fine : static_cast<double>(u[lane]);
+    descent.probability[lane] = pick(active[lane] != 0, 1.0f, 0.0f);
     descent.leaf[lane] = 0;
-    going[lane] = active[lane] && split ? 1 : 0;
+    goesOn[lane] = (active[lane] != 0) & (rightOfRoot != 0) ? 1 : 0;
+    right[lane] = goesOn[lane] ? rightOfRoot : 0;
   }
-  GroupLanes left, right;
-  LaneFlags second{};
-  alignas(64) float ofLeft[kLanes], ofRight[kLanes];
+  GroupLanes first, second;
   for (;;) {
-    bool any = false;
+    int any = 0;
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      const Node& node = nodes_[static_cast<std::size_t>(descent.leaf[lane])];
-      going[lane] = going[lane] != 0 && node.count == 0 ? 1 : 0;
-      if (!going[lane]) continue;
-      any = true;
-      second[lane] = static_cast<int>(node.right);
-      left.set(lane, (&node + 1)->group);
-      right.set(lane, nodes_[node.right].group);
+      // Those that have arrived stay where they are.
+      left[lane] = descent.leaf[lane] + goesOn[lane];
+      any |= goesOn[lane];
     }
-    if (!any) return;
-    importanceLanes(left, p, n, ofLeft);
-    importanceLanes(right, p, n, ofRight);
-    stepDown(ofLeft, ofRight, second, going, descent);
+    if (any == 0) return;
+    turnRecords(groups, left, &first);
+    turnRecords(groups, right, &second);
+#pragma GCC ivdep
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const bool goes = goesOn[lane] != 0;
+      const LightQuery query{p[lane], kOpen ? Vec3(0.0f) : n[lane]};
+      const float ofLeft = importanceOf<kOpen>(first[lane], query), ofRight = importanceOf<kOpen>(second[lane], query);
+      const float total = ofLeft + ofRight;
+      const bool some = total > 0.0f;
+      const float share = ofLeft / pick(some, total, 1.0f);
+      const double rest = descent.rest[lane];
+      const auto border = static_cast<double>(share);
+      const bool toLeft = (rest < border) | !(ofRight > 0.0f);
+      const double below = toLeft ? rest : rest - border;
+      const double width = toLeft ? border : 1.0 - border;
+      const double perWidth = below / width;
+      descent.rest[lane] = goes & some ? perWidth : rest;
+      const float stepped = descent.probability[lane] * pick(toLeft, share, 1.0f - share);
+      descent.probability[lane] = pick(goes, pick(some, stepped, 0.0f), descent.probability[lane]);
+      const int child = toLeft ? left[lane] : right[lane];
+      const int beyond = toLeft ? first.right[lane] : second.right[lane];
+      const bool further = goes & some & (beyond != 0);
+      descent.leaf[lane] = goes & some ? child : descent.leaf[lane];
+      right[lane] = further ? beyond : descent.leaf[lane];
+      goesOn[lane] = further ? 1 : 0;
+    }
+  }
+}
+
+LUMEL_FOR_EACH_CPU void LightTree::descendOpen(const Group* groups, const Vec3Lanes& p, const LaneFlags& active,
+                                               const float* u, Descent& descent) {
+  descendLanes<true>(groups, p, p, active, u, descent);
+}
+
+LUMEL_FOR_EACH_CPU void LightTree::descendSided(const Group* groups, const Vec3Lanes& p, const Vec3Lanes& n,
+                                                const LaneFlags& active, const float* u, Descent& descent) {
+  descendLanes<false>(groups, p, n, active, u, descent);
+}
+
+void LightTree::descend(const Vec3Lanes& p, const Vec3Lanes* n, const LaneFlags& active, const float* u,
+                        Descent& descent) const {
+  if (n == nullptr && !bounded_)
+    descendOpen(groups_.data(), p, active, u, descent);
+  else
+    descendSided(groups_.data(), p, n == nullptr ? Vec3Lanes() : *n, active, u, descent);
+}
+
+void LightTree::lightsOf(const Descent& descent, std::array<LaneFlags, kLeaf>& lights) const {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Node& leaf = nodes_[static_cast<std::size_t>(descent.leaf[lane])];
+    const std::uint32_t count = descent.probability[lane] > 0.0f ? leaf.count : 0u;
+    for (std::uint32_t i = 0; i < kLeaf; ++i)
+      lights[i][lane] = i < count ? static_cast<int>(order_[leaf.first + i]) : kNoLight;
   }
 }
 

@@ -63,7 +63,11 @@ class LightTree {
     alignas(64) float probability[kLanes];  // 0: nothing can arrive
     alignas(64) int leaf[kLanes];
   };
-  void descend(const Vec3Lanes& p, const Vec3Lanes& n, const LaneFlags& active, const float* u, Descent& descent) const;
+  /// `n` null leaves the sides open.
+  void descend(const Vec3Lanes& p, const Vec3Lanes* n, const LaneFlags& active, const float* u, Descent& descent) const;
+  /// The lights of each lane's leaf, or kNoLight where it has fewer or nothing can arrive.
+  static constexpr int kNoLight = -1;
+  void lightsOf(const Descent& descent, std::array<LaneFlags, kLeaf>& lights) const;
   template <class Importance>
   Choice chooseInLeaf(const Descent& descent, std::size_t lane, Importance importance) const {
     if (!(descent.probability[lane] > 0.0f)) return {};
@@ -80,30 +84,38 @@ class LightTree {
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu;
-  /// LightBounds, ready to be asked.
-  struct Group {
-    Vec3 centre{0}, half{0}, axis{0};
+  /// LightBounds, ready to be asked. A row of 16 floats, to be turned into lanes.
+  struct alignas(64) Group {
+    Vec3 centre{0};
     float radius2 = 0.0f;  // of the bounding sphere
+    Vec3 axis{0};
+    float power = 0.0f;
+    Vec3 half{0};
+    float reach = 0.0f;
     float cosSpread = 1.0f, sinSpread = 0.0f;
     float cosEmit = 0.0f;
-    float power = 0.0f;
-    float reach = 0.0f;
+    int right = 0;  // child; the left one follows its parent; 0: a leaf
   };
-  /// One for each lane.
+  /// One for each lane, in the same order.
   struct GroupLanes;
   struct Node {
-    Group group;
     std::uint32_t parent = kNone;
-    std::uint32_t right = 0;  // the left child follows its parent
     std::uint32_t first = 0;  // into order_
     std::uint32_t count = 0;  // 0: not a leaf
   };
+  std::uint32_t rightOf(std::uint32_t node) const { return static_cast<std::uint32_t>(groups_[node].right); }
+  /// `kOpen`: for queries without a normal, of lights that reach everywhere.
+  template <bool kOpen = false>
   static float importanceOf(const Group& group, const LightQuery& query);
   /// Of a node's children.
   std::array<float, 2> importancesBelow(std::uint32_t node, const LightQuery& query) const;
-  static void importanceLanes(const GroupLanes& groups, const Vec3Lanes& p, const Vec3Lanes& n, float* importances);
-  static void stepDown(const float* left, const float* right, const LaneFlags& second, LaneFlags& going,
-                       Descent& descent);
+  template <bool kOpen>
+  static void descendLanes(const Group* groups, const Vec3Lanes& p, const Vec3Lanes& n, const LaneFlags& active,
+                           const float* u, Descent& descent);
+  static void descendOpen(const Group* groups, const Vec3Lanes& p, const LaneFlags& active, const float* u,
+                          Descent& descent);
+  static void descendSided(const Group* groups, const Vec3Lanes& p, const Vec3Lanes& n, const LaneFlags& active,
+                           const float* u, Descent& descent);
   template <class Importance>
   Choice chooseInLeaf(const Node& leaf, double rest, float probability, Importance importance) const;
   void build(std::span<const LightBounds> lights, std::size_t first, std::size_t count, std::uint32_t parent,
@@ -112,6 +124,8 @@ class LightTree {
   float leafImportances(const Node& leaf, Importance importance, std::array<float, kLeaf>& each) const;
 
   std::vector<Node> nodes_;
+  bool bounded_ = false;               // some lights do not reach everywhere
+  std::vector<Group> groups_;          // of the nodes
   std::vector<std::uint32_t> order_;   // lights, leaf by leaf
   std::vector<std::uint32_t> leafOf_;  // per light; kNone: never chosen
 };
@@ -145,7 +159,7 @@ LightTree::Choice LightTree::choose(const LightQuery& query, float u, Importance
     } else {
       rest = (rest - border) / (1.0 - border);
       probability *= 1.0f - share;
-      at = nodes_[at].right;
+      at = rightOf(at);
     }
   }
   return chooseInLeaf(nodes_[at], rest, probability, importance);

@@ -237,7 +237,7 @@ void PunctualLights::choose(std::size_t first, const ReceiverLanes& at, const Un
   } else {
     LightTree::Descent descent;
     const bool byTree = !tree_.empty() && first == directional_;
-    if (byTree) tree_.descend(at.p, at.ns, at.active, u.u, descent);
+    if (byTree) tree_.descend(at.p, &at.ns, at.active, u.u, descent);
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if (!at.active[lane]) continue;
       const Vec3 p = at.p[lane], n = at.ns[lane];

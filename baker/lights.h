@@ -142,19 +142,20 @@ class EmissiveTriangles {
   static constexpr float kMostSolidAngle = 6.2f;
 
  private:
-  struct Emitter {
+  /// Begins with a row of 16 floats, to be turned into lanes.
+  struct alignas(64) Emitter {
     Vec3 corner{0};  // world
-    Vec3 e1{0};      // to the other corners
-    Vec3 e2{0};
-    Vec3 ng{0};  // unit, front
     float doubleArea = 0.0f;
+    Vec3 e1{0};              // to the other corners
+    float luminance = 0.0f;  // mean of what it sends out
+    Vec3 e2{0};
+    float back = 0.0f;          // 1: it shines from behind too
+    Vec3 ng{0};                 // unit, front
     float offsetMeters = 0.0f;  // of the ends of shadow rays
-    float luminance = 0.0f;     // mean of what it sends out
+    Vec3 radiance{0};
+    bool uniform = false;  // it sends out `radiance` everywhere
     std::uint32_t part = 0;
     std::uint32_t triangle = 0;
-    float back = 0.0f;     // 1: it shines from behind too
-    bool uniform = false;  // it sends out `radiance` everywhere
-    Vec3 radiance{0};
   };
   /// Fills all from the part and the triangle.
   void describe(Emitter& emitter) const;
@@ -162,6 +163,8 @@ class EmissiveTriangles {
   /// The emitters that the lanes chose, and with which probability.
   struct Chosen;
   static void chooseAmongFew(std::span<const Emitter> few, const Vec3Lanes& p, const UnitLanes& u, Chosen& chosen);
+  static void chooseInLeaves(const Emitter* triangles, const std::array<LaneFlags, LightTree::kLeaf>& lights,
+                             const LightTree::Descent& descent, const Vec3Lanes& p, Chosen& chosen);
   static void samplePoints(const Vec3Lanes& p, const UnitSquareLanes& u, Chosen& chosen, LightSampleLanes& samples);
   /// For the choice.
   float importance(std::uint32_t triangle, const Vec3& p) const;

@@ -55,8 +55,10 @@ std::vector<LightBounds> mixture(std::size_t count, Random& random) {
 // Lanes in step, some of them without a point, end where each would by itself; a tree of one leaf has no step to take.
 TEST(LightTree, LanesDescendAsSinglePointsDo) {
   Random random(4);
-  for (const std::size_t count : {std::size_t{3}, std::size_t{300}}) {
-    const std::vector<LightBounds> lights = mixture(count, random);
+  for (const auto& [count, bounded] : {std::pair{3, true}, std::pair{300, true}, std::pair{300, false}}) {
+    std::vector<LightBounds> lights = mixture(static_cast<std::size_t>(count), random);
+    if (!bounded)
+      for (LightBounds& light : lights) light.reach = std::numeric_limits<float>::infinity();
     const LightTree tree(lights);
     const auto importance = [&](std::uint32_t light) { return lights[light].power; };
     for (int trial = 0; trial < 200; ++trial) {
@@ -70,7 +72,7 @@ TEST(LightTree, LanesDescendAsSinglePointsDo) {
         u[lane] = random.unit();
       }
       LightTree::Descent descent;
-      tree.descend(p, n, active, u.data(), descent);
+      tree.descend(p, trial % 2 ? &n : nullptr, active, u.data(), descent);
       for (std::size_t lane = 0; lane < kLanes; ++lane) {
         const LightTree::Choice choice = tree.chooseInLeaf(descent, lane, importance);
         const LightTree::Choice one = tree.choose({p[lane], n[lane]}, u[lane], importance);
