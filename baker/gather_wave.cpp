@@ -223,14 +223,19 @@ float GatherWave::shareOf(const TriangleRef& triangle) const {
 /// At the points drawn of a texel; asks memory for what meanReflectance reads.
 void GatherWave::findAlbedos(std::size_t lane, WarmAlbedos& albedos) const {
   const Materials& materials = scene_.transport.materials;
+  TriangleRef measured;
+  float uvWidth = 0.0f;
   for (std::uint32_t i = 0; i < kWarmLights; ++i) {
     const PlaceOnTriangle place = points_.place(lane, i);
     const TrianglePoint point = sourceOf(place);
+    if (i == 0 || !(place.triangle == measured)) {
+      measured = place.triangle;
+      // A mean would hold what is cut away. One over all that a point stands for would reach beyond the texel.
+      const bool whole = materials.material(point.primitive->material).alphaMode == AlphaMode::Opaque;
+      uvWidth = whole ? materials.albedoWidth(point, 0.25f / kWarmLights * shareOf(measured)) : 0.0f;
+    }
     albedos.points[i] = point;
-    // A mean would hold what is cut away. One over all that a point stands for would reach beyond the texel.
-    const bool whole = materials.material(point.primitive->material).alphaMode == AlphaMode::Opaque;
-    const float share = whole ? 0.25f / kWarmLights * shareOf(place.triangle) : 0.0f;
-    albedos.lookups[i] = materials.findAlbedo(point, share);
+    albedos.lookups[i] = materials.findAlbedo(point, uvWidth);
     albedos.lookups[i].prefetch();
   }
 }

@@ -87,13 +87,16 @@ const TexturePyramid* Materials::colorTexture(int index) const {
   return texture ? &*texture : nullptr;
 }
 
-Materials::AlbedoLookup Materials::findAlbedo(const TrianglePoint& point, float share) const {
+float Materials::albedoWidth(const TrianglePoint& point, float share) const {
+  return std::sqrt(share * uvAreaOf(point, material(point.primitive->material).baseColorMap.uvSet));
+}
+
+Materials::AlbedoLookup Materials::findAlbedo(const TrianglePoint& point, float uvWidth) const {
   const Material& m = material(point.primitive->material);
   AlbedoLookup lookup{Vec3(m.baseColor)};
   if (const TexturePyramid* textures = colorTexture(point.primitive->material)) {
     const TextureRef& ref = m.baseColorMap;
-    lookup.texture =
-        share > 0.0f ? &textures->level(ref, std::sqrt(share * uvAreaOf(point, ref.uvSet))) : &textures->finest();
+    lookup.texture = uvWidth > 0.0f ? &textures->level(ref, uvWidth) : &textures->finest();
     lookup.at = lookup.texture->footprint(ref, uvAt(point, ref.uvSet));
   }
   if (!point.primitive->colors.empty()) lookup.factor *= Vec3(interpolate(point, point.primitive->colors));

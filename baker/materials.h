@@ -42,8 +42,10 @@ class Materials {
   };
   AlbedoLookup findAlbedo(const TrianglePoint& point) const { return findAlbedo(point, 0.0f); }
   static Vec3 albedo(const AlbedoLookup& lookup);
-  /// Leads to the mean about the point over roughly `share` of its triangle's area, of the texture alone.
-  AlbedoLookup findAlbedo(const TrianglePoint& point, float share) const;
+  /// Leads to the texture's mean about the point, over roughly `uvWidth` on a side.
+  AlbedoLookup findAlbedo(const TrianglePoint& point, float uvWidth) const;
+  /// How wide `share` of a point's triangle is in the texture, as a square.
+  float albedoWidth(const TrianglePoint& point, float share) const;
   /// Whether albedo() is the same on all of the primitive.
   bool hasOneAlbedo(const Primitive& primitive) const {
     return primitive.colors.empty() && colorTexture(primitive.material) == nullptr;

@@ -61,7 +61,7 @@ Bitmap touchedTexels(const PackShape& source, const Vec2d& offset, const Vec2d& 
 
 /// Moves the shape to the origin and marks its texels. Its box rarely ends on a texel border; of the ways to share out
 /// that slack, the one that touches the fewest texels (the even one if there is no better).
-void rasterise(const PackShape& source, GridShape& shape) {
+void rasterise(const PackShape& source, bool shift, GridShape& shape) {
   const Box box = boxOf(source);
   if (box.low.x > box.high.x) return;
   shape.toBitmap = -box.low;
@@ -73,7 +73,7 @@ void rasterise(const PackShape& source, GridShape& shape) {
   shape.toBitmap = 0.5 * slack - box.low;
   shape.texels = touchedTexels(source, shape.toBitmap, shape.size);
   const bool isBox = shape.texels.count() == static_cast<std::size_t>(shape.size.x * shape.size.y);
-  if (isBox || shape.size.x * shape.size.y > kMostTexelsToShift) return;
+  if (!shift || isBox || shape.size.x * shape.size.y > kMostTexelsToShift) return;
   std::size_t fewest = shape.texels.count();
   Vec2d best(0.5);
   for (int axis = 0; axis < 2; ++axis)
@@ -139,7 +139,7 @@ GridSettings gridSettings(int pageSize, int padding, int blockAlign) {
 std::vector<GridShape> rasteriseShapes(std::span<const PackShape> sources) {
   std::vector<GridShape> shapes(sources.size());
   parallelFor(sources.size(), 16, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) rasterise(sources[i], shapes[i]);
+    for (std::size_t i = first; i < last; ++i) rasterise(sources[i], true, shapes[i]);
   });
   return shapes;
 }
@@ -160,7 +160,7 @@ Vec2d snapFactors(const PackShape& source, const GridSettings& settings) {
     for (auto& triangle : scaled.triangles)
       for (Vec2& p : triangle) p = Vec2(Vec2d(p) * scale);
     GridShape shape;
-    rasterise(scaled, shape);
+    rasterise(scaled, false, shape);
     return shape.texels.empty() ? 0.0 : static_cast<double>(roomOf(shape.texels, settings));
   };
   Vec2d best(1.0);
