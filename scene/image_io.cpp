@@ -68,7 +68,7 @@ Error unreadable(const std::string& name, const std::string& why) {
 }
 
 Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& name, const Head& head,
-                                 const Progress& progress = noProgress()) {
+                                 PixelsAs as = PixelsAs::Floats, const Progress& progress = noProgress()) {
   const OIIO::ImageSpec& spec = input.spec();
   if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0) return inputError(name + ": the image has no pixels");
   if (spec.width > kMaxDimension || spec.height > kMaxDimension)
@@ -83,12 +83,21 @@ Expected<LoadedImage> readOpened(OIIO::ImageInput& input, const std::string& nam
   for (const OIIO::ParamValue& attribute : spec.extra_attribs)
     if (attribute.type().basetype == OIIO::TypeDesc::STRING || attribute.type().basevalues() == 1)
       loaded.metadata[attribute.name().string()] = attribute.get_string();
-  loaded.image = Image(spec.width, spec.height, spec.nchannels);
+  const bool asBytes = as == PixelsAs::Stored && spec.format == OIIO::TypeDesc::UINT8;
+  if (asBytes) {
+    loaded.image.width = spec.width;
+    loaded.image.height = spec.height;
+    loaded.image.channels = spec.nchannels;
+    loaded.bytes.resize(spec.image_pixels() * static_cast<std::size_t>(spec.nchannels));
+  } else {
+    loaded.image = Image(spec.width, spec.height, spec.nchannels);
+  }
+  void* const pixels = asBytes ? static_cast<void*>(loaded.bytes.data()) : loaded.image.pixels.data();
   const std::string noteOfHead = input.geterror();
   const auto stop = [](void* p, float) { return static_cast<const Progress*>(p)->cancelled(); };
   const bool read =
-      input.read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, loaded.image.pixels.data(), OIIO::AutoStride,
-                       OIIO::AutoStride, OIIO::AutoStride, stop, const_cast<Progress*>(&progress));
+      input.read_image(0, 0, 0, spec.nchannels, asBytes ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT, pixels,
+                       OIIO::AutoStride, OIIO::AutoStride, OIIO::AutoStride, stop, const_cast<Progress*>(&progress));
   if (progress.cancelled()) return interrupted();
   // Some readers fill in what is missing, note it and go on. What libjpeg skips between markers does no harm.
   const std::string note = input.geterror();
@@ -157,12 +166,12 @@ Expected<LoadedImage> readImage(const std::filesystem::path& file, const Progres
   config.attribute("oiio:UnassociatedAlpha", 1);
   auto input = openImage(name, &config);
   if (!input) return unreadable(name, OIIO::geterror());
-  auto loaded = readOpened(*input, name, head, progress);
+  auto loaded = readOpened(*input, name, head, PixelsAs::Floats, progress);
   if (loaded && !note.empty()) loaded->metadata["ImageDescription"] = note;
   return loaded;
 }
 
-Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std::string& name) {
+Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std::string& name, PixelsAs as) {
   const auto read = [&](std::uint64_t at, std::span<std::uint8_t> into) {
     std::copy_n(encoded.begin() + static_cast<std::ptrdiff_t>(at), into.size(), into.begin());
     return true;
@@ -175,14 +184,14 @@ Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
   auto input = openImage("memory." + extension, &config, &memory);
-  if (input) return readOpened(*input, name, head);
+  if (input) return readOpened(*input, name, head, as);
   // Readers without memory support go through a temporary file.
   static std::atomic<int> counter{0};
   const auto file = std::filesystem::temp_directory_path() /
                     ("lumel-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + "." + extension);
   const std::string_view bytes(reinterpret_cast<const char*>(encoded.data()), encoded.size());
   if (writeBytes({name, file}, bytes)) input = openImage(file.string(), &config);
-  auto result = input ? readOpened(*input, name, head) : unreadable(name, OIIO::geterror());
+  auto result = input ? readOpened(*input, name, head, as) : unreadable(name, OIIO::geterror());
   std::error_code ec;
   std::filesystem::remove(file, ec);
   return result;

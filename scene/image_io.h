@@ -26,13 +26,17 @@ struct LoadedImage {
   int bitsPerChannel = 0;                       // 8, 16 or 32
   bool isFloat = false;                         // half or float in the file
   bool paletted = false;                        // indexed colours (expanded in `image`)
+  std::vector<std::uint8_t> bytes;              // in place of image.pixels, see PixelsAs::Stored
 };
+
+enum class PixelsAs { Floats, Stored };  // Stored: files of unsigned bytes leave image.pixels empty and fill `bytes`
 
 /// Reads any format that OpenImageIO knows. Errors: Input, naming the file; Interrupted.
 Expected<LoadedImage> readImage(const std::filesystem::path& file, const Progress& progress = noProgress());
 
 /// The same from encoded bytes in memory (glTF images: PNG, JPEG, WebP, ...). `name` is for messages.
-Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std::string& name);
+Expected<LoadedImage> readImage(std::span<const std::uint8_t> encoded, const std::string& name,
+                                PixelsAs as = PixelsAs::Floats);
 
 /// Width and height from an image's header alone; 0 x 0 if it cannot be read from memory.
 std::array<int, 2> imageSize(std::span<const std::uint8_t> encoded);

@@ -90,36 +90,36 @@ float tameCoordinate(float uv) { return std::isfinite(uv) ? std::clamp(uv, -1e6f
 
 Expected<Texture> Texture::decode(const ImageSource& source, ColorSpace space) {
   if (source.encoded.empty()) return inputError(source.name + ": the image is missing");
-  auto loaded = readImage(source.encoded, source.name);
+  auto loaded = readImage(source.encoded, source.name, PixelsAs::Stored);
   if (!loaded) return loaded.error();
-  const Image& image = loaded->image;
   Texture texture;
-  texture.width_ = image.width;
-  texture.height_ = image.height;
+  texture.width_ = loaded->image.width;
+  texture.height_ = loaded->image.height;
   texture.space_ = space;
-  const bool bytes = loaded->bitsPerChannel <= 8;
-  const std::size_t texels = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
-  const auto channels = static_cast<std::size_t>(image.channels);
-  if (bytes) {
-    texture.bytes_.resize(3 * texels);
-    texture.alphaBytes_.resize(texels);
-  } else {
-    texture.floats_.resize(4 * texels);
-  }
-  for (std::size_t t = 0; t < texels; ++t) {
-    const float* in = &image.pixels[t * channels];
+  const std::size_t texels = static_cast<std::size_t>(texture.width_) * static_cast<std::size_t>(texture.height_);
+  const auto channels = static_cast<std::size_t>(loaded->image.channels);
+  const bool bytes = !loaded->bytes.empty();
+  texture.bytes_.resize(bytes ? 3 * texels : 0);
+  texture.alphaBytes_.resize(bytes ? texels : 0);
+  texture.floats_.resize(bytes ? 0 : 4 * texels);
+  const auto rgbaOf = [&](const auto* in, auto opaque) {
     const bool grey = channels < 3;
-    float rgba[4] = {in[0], grey ? in[0] : in[1], grey ? in[0] : in[2], 1.0f};
-    if (channels == 2) rgba[3] = in[1];
-    if (channels >= 4) rgba[3] = in[3];
-    for (std::size_t c = 0; c < 4; ++c) {
-      if (bytes)
-        texture.byteOf(t, c) = static_cast<std::uint8_t>(std::lround(std::clamp(rgba[c], 0.0f, 1.0f) * 255.0f));
-      else
-        // Float files (EXR, HDR) are linear already; 16-bit ones are encoded as 8-bit ones are.
-        texture.floats_[4 * t + c] =
-            space == ColorSpace::Srgb && c < 3 && !loaded->isFloat ? srgbToLinear(rgba[c]) : rgba[c];
+    return std::array{in[0], grey ? in[0] : in[1], grey ? in[0] : in[2],
+                      channels >= 4   ? in[3]
+                      : channels == 2 ? in[1]
+                                      : opaque};
+  };
+  for (std::size_t t = 0; t < texels; ++t) {
+    if (bytes) {
+      const auto rgba = rgbaOf(&loaded->bytes[t * channels], std::uint8_t{255});
+      for (std::size_t c = 0; c < 4; ++c) texture.byteOf(t, c) = rgba[c];
+      continue;
     }
+    const auto rgba = rgbaOf(&loaded->image.pixels[t * channels], 1.0f);
+    // Float files (EXR, HDR) are linear already; 16-bit ones are encoded as 8-bit ones are.
+    for (std::size_t c = 0; c < 4; ++c)
+      texture.floats_[4 * t + c] =
+          space == ColorSpace::Srgb && c < 3 && !loaded->isFloat ? srgbToLinear(rgba[c]) : rgba[c];
   }
   texture.sortAlpha();
   return texture;
