@@ -70,10 +70,10 @@ Polygon clipToTexel(const std::array<Vec2d, 3>& triangle, TexelCoord texel) {
 }
 
 /// Weights of vertices 1 and 2 for p, kept inside the triangle against rounding.
-Vec2 barycentricOf(const std::array<Vec2d, 3>& t, const Vec2d& p) {
-  const double twiceArea = cross(t[1] - t[0], t[2] - t[0]);
-  const double w1 = std::clamp(cross(p - t[0], t[2] - t[0]) / twiceArea, 0.0, 1.0);
-  const double w2 = std::clamp(cross(t[1] - t[0], p - t[0]) / twiceArea, 0.0, 1.0 - w1);
+Vec2 barycentricOf(const TexelFootprint::Source& source, const Vec2d& p) {
+  const Vec2d fromFirst = p - source.texels[0];
+  const double w1 = std::clamp(glm::dot(fromFirst, source.perTexel1), 0.0, 1.0);
+  const double w2 = std::clamp(glm::dot(fromFirst, source.perTexel2), 0.0, 1.0 - w1);
   return {static_cast<float>(w1), static_cast<float>(w2)};
 }
 
@@ -114,11 +114,16 @@ Vec3 geometricNormalOf(const Surface& surface, const std::array<std::uint32_t, 3
 
 TexelFootprint::Source TexelFootprint::sourceOf(const TriangleRef& ref) const {
   const Surface& surface = atlas_->surfaces[ref.surface];
-  Source source{.triangle = ref, .vertices = {}, .geometricNormal = {}, .texels = {}};
+  Source source;
+  source.triangle = ref;
   for (std::size_t i = 0; i < 3; ++i) {
     source.vertices[i] = surface.indices[std::size_t{3} * ref.triangle + i];
     source.texels[i] = snapToTexelBorder(Vec2d(surface.lightmapUvs[source.vertices[i]]) * Vec2d(width_, height_));
   }
+  const Vec2d e1 = source.texels[1] - source.texels[0], e2 = source.texels[2] - source.texels[0];
+  const double perTwiceArea = 1.0 / cross(e1, e2);
+  source.perTexel1 = perTwiceArea * Vec2d(e2.y, -e2.x);
+  source.perTexel2 = perTwiceArea * Vec2d(-e1.y, e1.x);
   source.geometricNormal = geometricNormalOf(surface, source.vertices);
   return source;
 }
@@ -137,14 +142,14 @@ double TexelFootprint::clip(const Atlas& atlas, const PageTexels& page, std::siz
     const auto known = std::ranges::find(before_, ref, &Source::triangle);
     const auto source = static_cast<std::uint32_t>(sources_.size());
     sources_.push_back(known != before_.end() ? *known : sourceOf(ref));
-    const std::array<Vec2d, 3>& triangle = sources_.back().texels;
-    const Polygon polygon = clipToTexel(triangle, page.coords[texel]);
+    const Polygon polygon = clipToTexel(sources_.back().texels, page.coords[texel]);
     if (polygon.count < 3) {
       sources_.pop_back();
       continue;
     }
     std::array<Vec2, 8> barycentrics;
-    for (std::size_t i = 0; i < polygon.count; ++i) barycentrics[i] = barycentricOf(triangle, polygon.corners[i]);
+    for (std::size_t i = 0; i < polygon.count; ++i)
+      barycentrics[i] = barycentricOf(sources_.back(), polygon.corners[i]);
     for (std::size_t i = 2; i < polygon.count; ++i) {
       const Vec2d& first = polygon.corners[0];
       const double area = 0.5 * std::abs(cross(polygon.corners[i - 1] - first, polygon.corners[i] - first));
@@ -197,7 +202,7 @@ SurfacePoint TexelFootprint::centroid() const {
     nearest = &piece;
     nearestPoint = point;
   }
-  return pointOn(*nearest, barycentricOf(sources_[nearest->source].texels, nearestPoint));
+  return pointOn(*nearest, barycentricOf(sources_[nearest->source], nearestPoint));
 }
 
 SurfacePoint TexelFootprint::pointOn(const Piece& piece, Vec2 barycentric) const {

@@ -59,6 +59,7 @@ class TexelFootprint {
     std::array<std::uint32_t, 3> vertices;
     Vec3 geometricNormal;
     std::array<Vec2d, 3> texels;  // its corners on the page, snapped (raster.h)
+    Vec2d perTexel1, perTexel2;   // how the weights of vertices 1 and 2 grow across the page
   };
   struct Piece {
     std::uint32_t source = 0;         // into sources()
