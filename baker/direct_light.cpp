@@ -70,7 +70,7 @@ LUMEL_FOR_EACH_CPU void aimByCosine(const ReceiverLanes& receivers, const UnitSq
 
 std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& strategy, const ReceiverLanes& receivers,
                         const SampleLanes& samples, std::uint32_t patternBase, const SurfaceDensity& density,
-                        SampledLight& sampled) {
+                        SampledLight& sampled, const EnvironmentLight::Places* sky) {
   LightSampleLanes taken;
   switch (strategy.kind) {
     case LightStrategy::EveryPunctual:
@@ -90,7 +90,8 @@ std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& st
       transport.environment.sampleSun(samples.draw2D(patternBase + kSun), taken);
       break;
     case LightStrategy::Sky:
-      transport.environment.sampleSky(samples.draw2D(patternBase + kSky), taken);
+      transport.environment.sampleSky(
+          sky != nullptr ? *sky : transport.environment.findSky(samples.draw2D(patternBase + kSky)), taken);
       break;
   }
   const int count = aimShadows(receivers, taken, density, sampled);

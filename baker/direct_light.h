@@ -57,10 +57,10 @@ struct SampledLight {
 
 /// Takes one light sample by `strategy` for every active lane. `density`: with which the receivers gather from a
 /// direction, for multiple importance sampling against hits. Samples whose shadow rays are to be traced are set in
-/// `sampled.shadows`; returns their number.
+/// `sampled.shadows`; returns their number. `sky`: of Sky, what findSky() found for these samples, if that is known.
 std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& strategy, const ReceiverLanes& receivers,
                         const SampleLanes& samples, std::uint32_t patternBase, const SurfaceDensity& density,
-                        SampledLight& sampled);
+                        SampledLight& sampled, const EnvironmentLight::Places* sky = nullptr);
 
 /// One sample by each of the strategies that the scene needs: calls add(lane, wi, radianceOverPdf) for each that is
 /// visible. Returns the number of shadow rays.

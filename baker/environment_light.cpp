@@ -68,15 +68,6 @@ std::size_t columnsFor(const Image& image) {
 
 }  // namespace
 
-/// Cells that were chosen, and where in them.
-struct EnvironmentLight::Places {
-  LaneFlags row;
-  LaneFlags column;
-  LaneFlags cell;
-  alignas(64) float x[kLanes];
-  alignas(64) float y[kLanes];
-};
-
 std::size_t EnvironmentLight::cellCount(const Image& image) {
   return image.empty() ? 1 : rowsFor(image) * columnsFor(image);
 }
@@ -294,7 +285,7 @@ void EnvironmentLight::sampleSun(const UnitSquareLanes& u, LightSampleLanes& sam
   take(places, samples);
 }
 
-void EnvironmentLight::sampleSky(const UnitSquareLanes& u, LightSampleLanes& samples) const {
+EnvironmentLight::Places EnvironmentLight::findSky(const UnitSquareLanes& u) const {
   Distribution::Lanes row, column;
   rows_.choose(u.y, row);
   Places places;
@@ -307,7 +298,7 @@ void EnvironmentLight::sampleSky(const UnitSquareLanes& u, LightSampleLanes& sam
     places.x[lane] = column.rest[lane];
     places.y[lane] = row.rest[lane];
   }
-  take(places, samples);
+  return places;
 }
 
 namespace {

@@ -50,6 +50,11 @@ class EnvironmentLight {
   LightSample sampleSky(Vec2 u) const;
   void sampleSun(const UnitSquareLanes& u, LightSampleLanes& samples) const;
   void sampleSky(const UnitSquareLanes& u, LightSampleLanes& samples) const;
+  /// Cells that were chosen, and where in them.
+  struct Places;
+  /// In two steps: the first asks memory for the cells.
+  Places findSky(const UnitSquareLanes& u) const;
+  void sampleSky(const Places& places, LightSampleLanes& samples) const { take(places, samples); }
 
   /// A cell belongs to the bright part where its luminance is above this many times the image's mean.
   static constexpr float kSunContrast = 8.0f;
@@ -73,7 +78,6 @@ class EnvironmentLight {
     float cosRotation = 1.0f;
     float sinRotation = 0.0f;
   };
-  struct Places;
   std::vector<float> addCells(const Environment& environment);
   void splitOffSun(std::vector<float>& luminances);
   void addSky(const std::vector<float>& luminances);
@@ -96,5 +100,17 @@ class EnvironmentLight {
   std::vector<std::int32_t> sunCells_;  // ascending
   Distribution sun_;                    // over sunCells_
 };
+
+struct EnvironmentLight::Places {
+  LaneFlags row;
+  LaneFlags column;
+  LaneFlags cell;
+  alignas(64) float x[kLanes];
+  alignas(64) float y[kLanes];
+};
+
+inline void EnvironmentLight::sampleSky(const UnitSquareLanes& u, LightSampleLanes& samples) const {
+  take(findSky(u), samples);
+}
 
 }  // namespace lumel

@@ -402,11 +402,20 @@ static void tallyLight(const SampledLight& sampled, const Vec3Lanes& dirTangent,
 void GatherWave::sampleStrategy(std::size_t strategy, std::uint32_t first, std::uint32_t end, float weight, bool pilot,
                                 GatherSink& sink) {
   SampledLight sampled;
+  // While one sample's shadow rays are traced, memory brings the cells of the sky for the next.
+  std::array<EnvironmentLight::Places, 2> sky;
+  const bool isSky = scene_.strategies[strategy].kind == LightStrategy::Sky;
+  const auto findSky = [&](std::uint32_t s) {
+    lightSamples_.setSampleOfAll(s);
+    sky[s % 2] = scene_.transport.environment.findSky(lightSamples_.draw2D(kSky));
+  };
+  if (isSky) findSky(first);
   for (std::uint32_t s = first; s < end; ++s) {
     const PointLanes points = points_[s];
+    if (isSky && s + 1 < end) findSky(s + 1);
     lightSamples_.setSampleOfAll(s);
     const std::uint64_t rays = takeLight(scene_.transport, scene_.strategies[strategy], points.receivers(),
-                                         lightSamples_, 0, kGatherDensity, sampled);
+                                         lightSamples_, 0, kGatherDensity, sampled, isSky ? &sky[s % 2] : nullptr);
     if (rays == 0) continue;
     sink.result.shadowRays += rays;
     scene_.transport.rays.occluded(sampled.shadows, TraceMode::Packet);
