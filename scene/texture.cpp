@@ -240,7 +240,7 @@ Texture Texture::halved() const {
           mean += across.shares[u] * down.shares[v] * fetch(across.first + u, down.first + v);
       owed += mean;
       half.set(x, y, owed);
-      owed -= half.fetch(x, y);
+      owed = bytes_.empty() ? Vec4(0.0f) : owed - half.fetch(x, y);
     }
   }
   return half;
