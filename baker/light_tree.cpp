@@ -256,6 +256,7 @@ template <bool kOpen>
     right[lane] = goesOn[lane] ? rightOfRoot : 0;
   }
   GroupLanes first, second;
+  alignas(64) float ofLeft[kLanes], ofRight[kLanes];
   for (;;) {
     int any = 0;
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
@@ -266,17 +267,21 @@ template <bool kOpen>
     if (any == 0) return;
     turnRecords(groups, left, &first);
     turnRecords(groups, right, &second);
+    // A loop of its own: in one with what follows the compiler finds branches and leaves it scalar.
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const LightQuery query{p[lane], kOpen ? Vec3(0.0f) : n[lane]};
+      ofLeft[lane] = importanceOf<kOpen>(first[lane], query);
+      ofRight[lane] = importanceOf<kOpen>(second[lane], query);
+    }
 #pragma GCC ivdep
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       const bool goes = goesOn[lane] != 0;
-      const LightQuery query{p[lane], kOpen ? Vec3(0.0f) : n[lane]};
-      const float ofLeft = importanceOf<kOpen>(first[lane], query), ofRight = importanceOf<kOpen>(second[lane], query);
-      const float total = ofLeft + ofRight;
+      const float total = ofLeft[lane] + ofRight[lane];
       const bool some = total > 0.0f;
-      const float share = ofLeft / pick(some, total, 1.0f);
+      const float share = ofLeft[lane] / pick(some, total, 1.0f);
       const double rest = descent.rest[lane];
       const auto border = static_cast<double>(share);
-      const bool toLeft = (rest < border) | !(ofRight > 0.0f);
+      const bool toLeft = (rest < border) | !(ofRight[lane] > 0.0f);
       const double below = toLeft ? rest : rest - border;
       const double width = toLeft ? border : 1.0 - border;
       const double perWidth = below / width;
