@@ -124,17 +124,18 @@ LUMEL_FOR_EACH_CPU int differentNeighbours(const RayPacket& packet) {
 LUMEL_FOR_EACH_CPU FoundTexels sortFound(const RayPacket& packet, const std::array<std::uint32_t, kLanes>& texels,
                                          std::uint32_t others) {
   FoundTexels found;
-  std::uint32_t lookedUp = 0, hits = 0, rays = 0;
+  alignas(64) std::uint32_t ofRays[kLanes], ofHits[kLanes], ofTexels[kLanes];
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const std::uint32_t bit = 1u << lane;
-    const bool isRay = packet.valid[lane] != 0;
-    const bool isHit = isRay & (packet.rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID);
-    const bool isLookedUp = isHit & (texels[lane] != kNoTexel) & ((others & bit) == 0);
-    found.texels[lane] = isLookedUp ? texels[lane] : 0u;
-    lookedUp |= isLookedUp ? bit : 0u;
-    hits |= isHit ? bit : 0u;
-    rays |= isRay ? bit : 0u;
+    ofRays[lane] = packet.valid[lane] != 0 ? 1u << lane : 0u;
+    ofHits[lane] = packet.rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID ? ofRays[lane] : 0u;
+    ofTexels[lane] = (texels[lane] != kNoTexel ? ofHits[lane] : 0u) & ~others;
+    found.texels[lane] = ofTexels[lane] != 0 ? texels[lane] : 0u;
   }
+  // Loops of their own: in the one above the compiler would leave all scalar.
+  std::uint32_t rays = 0, hits = 0, lookedUp = 0;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) rays |= ofRays[lane];
+  for (std::size_t lane = 0; lane < kLanes; ++lane) hits |= ofHits[lane];
+  for (std::size_t lane = 0; lane < kLanes; ++lane) lookedUp |= ofTexels[lane];
   found.lookedUp = lookedUp;
   found.others = hits & ~lookedUp;
   found.missed = rays & ~hits;
