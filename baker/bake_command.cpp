@@ -10,7 +10,6 @@
 #include "baker/conventions.h"
 #include "baker/earlier_layout.h"
 #include "baker/finish.h"
-#include "baker/process_memory.h"
 #include "baker/quality.h"
 #include "baker/scene_arguments.h"
 #include "baker/stage_clock.h"
@@ -18,6 +17,7 @@
 #include "lightmap/texels.h"
 #include "scene/file_set.h"
 #include "scene/parallel.h"
+#include "scene/process_memory.h"
 
 namespace lumel {
 namespace {

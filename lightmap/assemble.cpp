@@ -2,31 +2,16 @@
 
 #include <algorithm>
 #include <bit>
-#include <unordered_map>
+#include <unordered_set>
 
 #include "lightmap/bake_frame.h"
 
 namespace lumel {
 namespace {
 
-struct VertexKey {
-  std::uint32_t source, chart;
-  std::uint64_t uv;
-  bool back;  // copy with its normal turned to the front
-  bool operator==(const VertexKey&) const = default;
-};
-
-struct VertexKeyHash {
-  std::size_t operator()(const VertexKey& k) const {
-    std::uint64_t h = k.uv * 0x9e3779b97f4a7c15u;
-    h ^= (h >> 29) + ((static_cast<std::uint64_t>(k.source) << 32) | k.chart);
-    h = (h ^ static_cast<std::uint64_t>(k.back)) * 0xbf58476d1ce4e5b9u;
-    return h ^ (h >> 32);
-  }
-};
-
 class SurfaceBuilder {
  public:
+  SurfaceBuilder(const SurfaceBuilder&) = delete;  // vertices_ points to it
   SurfaceBuilder(const Scene& scene, int instance, int primitive, int page)
       : source_(scene.primitive(scene.instances[static_cast<std::size_t>(instance)].mesh, primitive)),
         worldFromObject_(scene.instances[static_cast<std::size_t>(instance)].worldFromObject),
@@ -64,32 +49,67 @@ class SurfaceBuilder {
  private:
   Vec3 normal(std::uint32_t source) const { return normalMatrix_ * source_.normals[source]; }
 
+  /// What tells copies of a source's vertex apart. `back`: a copy with its normal turned to the front.
+  struct Copy {
+    std::uint32_t chart;
+    bool back;
+    bool operator==(const Copy&) const = default;
+  };
+
+  std::size_t hash(std::uint32_t vertex) const noexcept {
+    const Vec2 uv = surface_.lightmapUvs[vertex];
+    const Copy copy = copies_[vertex];
+    std::uint64_t h = (std::uint64_t{std::bit_cast<std::uint32_t>(uv.x)} << 32) | std::bit_cast<std::uint32_t>(uv.y);
+    h *= 0x9e3779b97f4a7c15u;
+    h ^= (h >> 29) + ((std::uint64_t{surface_.sourceVertex[vertex]} << 32) | copy.chart);
+    h = (h ^ static_cast<std::uint64_t>(copy.back)) * 0xbf58476d1ce4e5b9u;
+    return h ^ (h >> 32);
+  }
+  bool isSame(std::uint32_t a, std::uint32_t b) const noexcept {
+    const Vec2 uvA = surface_.lightmapUvs[a], uvB = surface_.lightmapUvs[b];
+    return surface_.sourceVertex[a] == surface_.sourceVertex[b] && copies_[a] == copies_[b] &&
+           std::bit_cast<std::uint64_t>(uvA) == std::bit_cast<std::uint64_t>(uvB);
+  }
+
   std::uint32_t vertex(std::uint32_t source, const Vec3& position, Vec2 uv, std::uint32_t chart, bool back,
                        const Vec3& geometric) {
-    const VertexKey key{
-        source, chart,
-        (static_cast<std::uint64_t>(std::bit_cast<std::uint32_t>(uv.x)) << 32) | std::bit_cast<std::uint32_t>(uv.y),
-        back};
-    const auto [place, isNew] = vertexOf_.try_emplace(key, static_cast<std::uint32_t>(surface_.positions.size()));
-    if (isNew) {
-      Vec3 n = normal(source) * (back ? -1.0f : 1.0f);
-      if (!(glm::dot(n, n) > 0) || !isFinite(n)) n = geometric;
-      // Through double: normals of tiny or huge instances may leave float's range when squared.
-      const Vec3d unit = glm::normalize(Vec3d(n));
-      surface_.positions.push_back(position);
-      surface_.normals.push_back(isFinite(Vec3(unit)) ? Vec3(unit) : Vec3(0, 0, 1));
-      surface_.lightmapUvs.push_back(uv);
-      surface_.sourceVertex.push_back(source);
+    const auto added = static_cast<std::uint32_t>(surface_.positions.size());
+    surface_.lightmapUvs.push_back(uv);
+    surface_.sourceVertex.push_back(source);
+    copies_.push_back({chart, back});
+    const auto [place, isNew] = vertices_.insert(added);
+    if (!isNew) {
+      surface_.lightmapUvs.pop_back();
+      surface_.sourceVertex.pop_back();
+      copies_.pop_back();
+      return *place;
     }
-    return place->second;
+    Vec3 n = normal(source) * (back ? -1.0f : 1.0f);
+    if (!(glm::dot(n, n) > 0) || !isFinite(n)) n = geometric;
+    // Through double: normals of tiny or huge instances may leave float's range when squared.
+    const Vec3d unit = glm::normalize(Vec3d(n));
+    surface_.positions.push_back(position);
+    surface_.normals.push_back(isFinite(Vec3(unit)) ? Vec3(unit) : Vec3(0, 0, 1));
+    return added;
   }
+
+  struct Hash {
+    const SurfaceBuilder& builder;
+    std::size_t operator()(std::uint32_t vertex) const noexcept { return builder.hash(vertex); }
+  };
+  struct Same {
+    const SurfaceBuilder& builder;
+    bool operator()(std::uint32_t a, std::uint32_t b) const noexcept { return builder.isSame(a, b); }
+  };
 
   const Primitive& source_;
   Mat4 worldFromObject_;
   Mat3 normalMatrix_;
   bool mirrors_;
   Surface surface_;
-  std::unordered_map<VertexKey, std::uint32_t, VertexKeyHash> vertexOf_;  // looked up only
+  std::vector<Copy> copies_;  // of surface_'s vertices
+  // The same vertices, by what they are: numbers alone, since keys beside them would be the peak of a large scene.
+  std::unordered_set<std::uint32_t, Hash, Same> vertices_{0, Hash{*this}, Same{*this}};
 };
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "lightmap/scene_uvs.h"
 #include "lightmap/uv_rounding.h"
 #include "scene/parallel.h"
+#include "scene/process_memory.h"
 #include "scene/stopwatch.h"
 
 namespace lumel {
@@ -41,6 +42,7 @@ class AtlasBuilder {
     placed_.resize(scene_.instances.size());
     if (Expected<void> used = useSceneUvs(); !used) return used.error();
     if (Expected<void> generated = generateCharts(); !generated) return generated.error();
+    returnFreeMemory();  // of many small charts, before surfaces take large arrays
     makeAllSurfaces();
     return std::move(result_);
   }
@@ -189,6 +191,9 @@ class AtlasBuilder {
       const ObjectLayout& layout = objects.layouts[use.layout];
       const Instance& instance = scene_.instances[static_cast<std::size_t>(use.instance)];
       std::vector<PlacedTriangle>& placed = placed_[static_cast<std::size_t>(use.instance)];
+      std::size_t triangles = placed.size();
+      for (const UnwrappedChart& chart : layout.unwrapped.charts) triangles += chart.triangles.size();
+      placed.reserve(triangles);
       const bool mirrors = glm::determinant(Mat3(instance.worldFromObject)) < 0;
       for (const UnwrappedChart& chart : layout.unwrapped.charts) {
         const std::uint64_t key = keys[shape];

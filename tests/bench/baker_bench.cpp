@@ -195,6 +195,46 @@ void BM_DirectLight(benchmark::State& state) {
 }
 BENCHMARK(BM_DirectLight);
 
+/// The way down a tree of lights. Arguments: lights; points with a normal, or open to all sides; by lanes, or point by
+/// point.
+void BM_LightTree(benchmark::State& state) {
+  const auto count = static_cast<int>(state.range(0));
+  const bool hasNormal = state.range(1) != 0, byLanes = state.range(2) != 0;
+  state.SetLabel(byLanes ? "by lanes" : "point by point");
+  const int side = static_cast<int>(std::ceil(std::sqrt(static_cast<float>(count))));
+  std::vector<LightBounds> lights;
+  for (int i = 0; i < count; ++i) {
+    const Vec3 p = Vec3(i % side, 0, i / side) * (48.0f / static_cast<float>(side)) + Vec3(0, 3.6f, 0);
+    lights.push_back({.min = p, .max = p + Vec3(0.05f, 0, 0.05f), .axis = {0, -1, 0}, .power = 1.0f});
+  }
+  const LightTree tree(lights);
+  Vec3Lanes p, n;
+  LaneFlags active;
+  active.fill(1);
+  alignas(64) float u[kLanes];
+  int wave = 0;
+  for (auto _ : state) {
+    const std::uint32_t key = hashBits(static_cast<std::uint32_t>(wave));
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const Receiver point = floorPoint(wave, static_cast<int>(lane));
+      p.set(lane, point.p);
+      n.set(lane, hasNormal ? point.ns : Vec3(0.0f));
+      u[lane] = unitFloat(hashCombine(key, static_cast<std::uint32_t>(lane)));
+    }
+    ++wave;
+    if (byLanes) {
+      LightTree::Descent descent;
+      tree.descend(p, hasNormal ? &n : nullptr, active, u, descent);
+      benchmark::DoNotOptimize(descent);
+    } else {
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        benchmark::DoNotOptimize(tree.choose({p[lane], n[lane]}, u[lane], [](std::uint32_t) { return 1.0f; }));
+    }
+  }
+  state.SetItemsProcessed(state.iterations() * kLanes);
+}
+BENCHMARK(BM_LightTree)->ArgsProduct({{1000, 100000}, {0, 1}, {0, 1}});
+
 /// One sample into the sums of a texel, with its projection.
 void BM_Accumulate(benchmark::State& state) {
   const RnmKernels kernels(Projection::Flat);

@@ -1,4 +1,4 @@
-#include "baker/process_memory.h"
+#include "scene/process_memory.h"
 
 #include <malloc.h>
 #include <sys/resource.h>
