@@ -148,9 +148,12 @@ LUMEL_FOR_EACH_CPU void WavePoints::choose(std::span<const Piece> pieces, float 
   }
 }
 
-/// The points that lie on one source.
-LUMEL_FOR_EACH_CPU void WavePoints::locate(const Source& from, std::uint32_t number, const Places& places,
+/// The points that lie on one source; whether there are any.
+LUMEL_FOR_EACH_CPU bool WavePoints::locate(const Source& from, std::uint32_t number, const Places& places,
                                            Drawn& drawn) {
+  std::uint32_t any = 0;
+  for (std::uint32_t i = 0; i < kMost; ++i) any |= places.source[i] == number ? 1u : 0u;
+  if (any == 0) return false;
   const Vec3 p0 = from.p0, e1 = from.e1, e2 = from.e2, ng = from.ng;
   const float distance = from.offsetMeters;
   for (std::uint32_t i = 0; i < kMost; ++i) {
@@ -163,6 +166,7 @@ LUMEL_FOR_EACH_CPU void WavePoints::locate(const Source& from, std::uint32_t num
       drawn.rayStart[k][i] = pick(here, start[k], drawn.rayStart[k][i]);
     }
   }
+  return true;
 }
 
 /// As frameFromTangent of the interpolated normal and tangent, without branches.
@@ -170,8 +174,7 @@ LUMEL_FOR_EACH_CPU void WavePoints::locateFrames(const Source& from, std::uint32
                                                  Drawn& drawn) {
   const std::array<Vec3, 3> normals = from.normals;
   const std::array<Vec4, 3> tangents = from.tangents;
-  const Vec3 ng = from.ng, e1 = from.e1, e2 = from.e2;
-  const float distance = from.rounded ? from.offsetMeters : std::numeric_limits<float>::infinity();
+  const Vec3 ng = from.ng;
   // A chart never mixes handedness, so neither does a triangle.
   const float hand = tangents[0].w < 0.0f ? -1.0f : 1.0f;
   constexpr float kMostFinite = std::numeric_limits<float>::max();
@@ -193,14 +196,27 @@ LUMEL_FOR_EACH_CPU void WavePoints::locateFrames(const Source& from, std::uint32
     const Vec3 t = pick(isFrame, side * unit, any.t);
     const float turn = pick(isFrame, hand, 1.0f);
     const Vec3 b = turn * glm::cross(n, t);
-    const Vec3 lift = liftToRound(w1 * e1 + w2 * e2, e1, e2, {w1, w2}, normals);
-    const bool lifted = glm::dot(lift, ng) > distance;
     for (int k = 0; k < 3; ++k) {
-      drawn.rayStart[k][i] += pick(here & lifted, lift[k], 0.0f);
       drawn.t[k][i] = pick(here, t[k], drawn.t[k][i]);
       drawn.b[k][i] = pick(here, b[k], drawn.b[k][i]);
       drawn.n[k][i] = pick(here, n[k], drawn.n[k][i]);
-      drawn.ng[k][i] = pick(here, pick(lifted, n[k], ng[k]), drawn.ng[k][i]);
+      drawn.ng[k][i] = pick(here, ng[k], drawn.ng[k][i]);
+    }
+  }
+}
+
+/// Rays from a rounded source start over its facet (liftToRound).
+LUMEL_FOR_EACH_CPU void WavePoints::lift(const Source& from, std::uint32_t number, const Places& places, Drawn& drawn) {
+  const std::array<Vec3, 3> normals = from.normals;
+  const Vec3 ng = from.ng, e1 = from.e1, e2 = from.e2;
+  const float distance = from.offsetMeters;
+  for (std::uint32_t i = 0; i < kMost; ++i) {
+    const float w1 = places.x[i], w2 = places.y[i];
+    const Vec3 move = liftToRound(w1 * e1 + w2 * e2, e1, e2, {w1, w2}, normals);
+    const bool lifted = (places.source[i] == number) & (glm::dot(move, ng) > distance);
+    for (int k = 0; k < 3; ++k) {
+      drawn.rayStart[k][i] += pick(lifted, move[k], 0.0f);
+      drawn.ng[k][i] = pick(lifted, drawn.n[k][i], drawn.ng[k][i]);
     }
   }
 }
@@ -217,8 +233,10 @@ void WavePoints::draw(const std::array<TexelSampler, kLanes>& samplers, std::uin
     choose(std::span(pieces_).subspan(firstPiece_[lane], firstPiece_[lane + 1] - firstPiece_[lane]),
            static_cast<float>(areas_[lane]), samplers[lane].seedOf(pattern), reversedIndices, places);
     for (std::uint32_t s = firstSource_[lane]; s < firstSource_[lane + 1]; ++s) {
-      locate(sources_[s], s, places, drawn_[lane]);
-      if (turns_[lane]) locateFrames(sources_[s], s, places, drawn_[lane]);
+      const Source& source = sources_[s];
+      if (!locate(source, s, places, drawn_[lane]) || !turns_[lane]) continue;
+      locateFrames(source, s, places, drawn_[lane]);
+      if (source.rounded) lift(source, s, places, drawn_[lane]);
     }
   }
   turnToLanes(drawn_.data(), turning_, p_.data(), rayStarts_.data(), surfaces_.data());

@@ -103,9 +103,10 @@ class WavePoints {
   void setFrame(std::size_t lane, const Frame& frame, const Vec3& ng);
   static void choose(std::span<const Piece> pieces, float area, std::uint32_t seed,
                      const std::uint32_t* reversedIndices, Places& places);
-  static void locate(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
+  static bool locate(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
   static void turnToLanes(const Drawn* drawn, bool turning, Vec3Lanes* p, Vec3Lanes* rayStarts, SurfaceLanes* surfaces);
   static void locateFrames(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
+  static void lift(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
 
   std::array<double, kLanes> areas_{};
   LaneFlags active_{};
