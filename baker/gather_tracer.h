@@ -64,8 +64,7 @@ class GatherTracer {
     const std::uint32_t texel = lookup.texels[static_cast<std::size_t>(lane)];
     if ((lookup.others >> lane & 1u) != 0) {
       const ScenePart& part = transport_.rays.parts()[lookup.parts[static_cast<std::size_t>(lane)]];
-      if (flight.depth == 0 && behind && !transport_.materials.material(part.primitive->material).doubleSided)
-        sink_.backFace(flight);
+      if (flight.depth == 0 && behind && !part.doubleSided) sink_.backFace(flight);
       if (part.firstEmitter >= 0) findEmission(packet, lane, flight);
     }
     if (flight.depth >= lastDepth_) return;
@@ -77,9 +76,12 @@ class GatherTracer {
   }
 
   /// In two steps: brings closer what shading the hit will read.
-  void expectSpot(const RayPacket& packet, int lane) const { transport_.rays.prefetchIndices(packet, lane); }
-  void expectSpot(const RayPacket& packet, int lane, std::uint32_t texel) const {
-    transport_.rays.prefetchCorners(packet, lane);
+  void expectPlace(const RayPacket& packet, const TexelMap::Lookup& lookup, std::size_t lane) const {
+    transport_.rays.prefetchIndices(lookup.parts[lane], packet.rayhit.hit.primID[lane]);
+  }
+  void expectSpot(const RayPacket& packet, const TexelMap::Lookup& lookup, std::size_t lane) const {
+    transport_.rays.prefetchCorners(lookup.parts[lane], packet.rayhit.hit.primID[lane]);
+    const std::uint32_t texel = lookup.texels[lane];
     if (!reflectance_.empty() && texel != kNoTexel) __builtin_prefetch(&reflectance_[texel]);
   }
 
@@ -130,8 +132,8 @@ class GatherTracer {
   /// better: what a texel holds beside a thing that stands on it may differ from what is under it.
   Vec3 albedoOf(const RayPacket& packet, int lane, const TexelMap::Lookup& lookup) const {
     const auto l = static_cast<std::size_t>(lane);
-    const Primitive& primitive = *transport_.rays.parts()[lookup.parts[l]].primitive;
-    if (transport_.materials.hasOneAlbedo(primitive)) return transport_.materials.albedo({&primitive});
+    const ScenePart& part = transport_.rays.parts()[lookup.parts[l]];
+    if (part.hasOneAlbedo) return part.albedo;
     if (reflectance_.empty() || lookup.texels[l] == kNoTexel)
       return transport_.materials.albedo(transport_.rays.pointAt(packet, lane));
     return unpackColor(reflectance_[lookup.texels[l]]);
@@ -161,8 +163,7 @@ class GatherTracer {
         break;
       case Stage::Traced:
         map_.findPixels(packet_, lookup_);
-        forEachLane(lookup_.others | lookup_.near,
-                    [&](std::size_t lane) { expectSpot(packet_, static_cast<int>(lane)); });
+        forEachLane(lookup_.others | lookup_.near, [&](std::size_t lane) { expectPlace(packet_, lookup_, lane); });
         stage_ = Stage::Placed;
         break;
       case Stage::Placed:
@@ -170,7 +171,7 @@ class GatherTracer {
         for (const std::uint32_t texel : lookup_.texels)
           if (texel != kNoTexel) sink_.prefetch(texel);
         forEachLane(lookup_.others | lookup_.near | lookup_.uneven,
-                    [&](std::size_t lane) { expectSpot(packet_, static_cast<int>(lane), lookup_.texels[lane]); });
+                    [&](std::size_t lane) { expectSpot(packet_, lookup_, lane); });
         stage_ = Stage::Found;
         break;
       case Stage::Found:

@@ -476,14 +476,13 @@ void GatherWave::launch(const GuideTable& guide, Packet& packet) {
 /// Asks memory for what collect() will read of a packet whose triangles are found, and then whose texels are.
 void GatherWave::expectSpots(const Packet& packet, const GatherTracer<GatherSink>& tracer) {
   forEachLane(packet.lookup.others | packet.lookup.near,
-              [&](std::size_t lane) { tracer.expectSpot(packet.rays.packet, static_cast<int>(lane)); });
+              [&](std::size_t lane) { tracer.expectPlace(packet.rays.packet, packet.lookup, lane); });
 }
 void GatherWave::expectLight(const Packet& packet, const GatherTracer<GatherSink>& tracer, const GatherSink& sink) {
   const TexelMap::Lookup& lookup = packet.lookup;
   for (const std::uint32_t texel : lookup.texels) sink.prefetch(texel != kNoTexel ? texel : 0u);
-  forEachLane(lookup.others | lookup.near | lookup.uneven, [&](std::size_t lane) {
-    tracer.expectSpot(packet.rays.packet, static_cast<int>(lane), lookup.texels[lane]);
-  });
+  forEachLane(lookup.others | lookup.near | lookup.uneven,
+              [&](std::size_t lane) { tracer.expectSpot(packet.rays.packet, lookup, lane); });
 }
 
 void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer, GatherSink& sink) const {

@@ -124,8 +124,9 @@ Expected<void> RayScene::buildGeometry(std::size_t mostFlattened) {
     const bool once = uses[static_cast<std::size_t>(instance.mesh)] == 1;
     if (once || placedTriangles <= mostFlattened || !invertible) {
       for (std::uint32_t p = firstPart; p < parts_.size(); ++p) {
-        auto geometry = triangles(*parts_[p].primitive, &instance.worldFromObject, &parts_[p].worldPositions);
+        auto geometry = triangles(*parts_[p].primitive, &instance.worldFromObject, &parts_[p].positions);
         if (!geometry) return failure("ray tracing: out of memory for the triangles of '" + instance.name + "'");
+        parts_[p].isWorld = true;
         rtcAttachGeometry(top_.get(), geometry.get());
         partOfGeometry_.push_back(p);
       }
@@ -158,6 +159,12 @@ std::uint32_t RayScene::addParts(int instanceIndex) {
   for (const Primitive& primitive : scene_->meshes[static_cast<std::size_t>(instance.mesh)].primitives) {
     if (materials_->invisible(primitive)) continue;
     ScenePart part;
+    part.indices = primitive.indices.data();
+    part.positions = primitive.positions.data();
+    part.normals = primitive.normals.empty() ? nullptr : primitive.normals.data();
+    part.doubleSided = materials_->material(primitive.material).doubleSided;
+    part.hasOneAlbedo = materials_->hasOneAlbedo(primitive);
+    if (part.hasOneAlbedo) part.albedo = materials_->albedo({&primitive});
     part.primitive = &primitive;
     part.instance = instanceIndex;
     part.worldFromObject = instance.worldFromObject;
@@ -265,33 +272,31 @@ float RayScene::translationOf(int instance) const {
 
 /// Of a vertex, in world space.
 static Vec3 corner(const ScenePart& part, std::uint32_t vertex) {
-  return part.worldPositions ? part.worldPositions[vertex]
-                             : Vec3(part.worldFromObject * Vec4(part.primitive->positions[vertex], 1.0f));
+  const Vec3& position = part.positions[vertex];
+  return part.isWorld ? position : Vec3(part.worldFromObject * Vec4(position, 1.0f));
 }
 
 std::array<Vec3, 3> RayScene::corners(const ScenePart& part, std::uint32_t triangle) const {
-  const std::uint32_t* index = part.primitive->indices.data() + std::size_t{3} * triangle;
+  const std::uint32_t* index = part.indices + std::size_t{3} * triangle;
   return {corner(part, index[0]), corner(part, index[1]), corner(part, index[2])};
 }
 
-void RayScene::prefetchCorners(const RayPacket& rays, int lane) const {
-  const ScenePart& part = parts_[partOf(rays, lane)];
-  const Vec3* positions = part.worldPositions ? part.worldPositions : part.primitive->positions.data();
-  const std::uint32_t* corner = indicesAt(rays, lane);
+void RayScene::prefetchCorners(std::uint32_t partIndex, std::uint32_t triangle) const {
+  const ScenePart& part = parts_[partIndex];
+  const std::uint32_t* index = part.indices + std::size_t{3} * triangle;
   for (std::size_t i = 0; i < 3; ++i) {
-    __builtin_prefetch(positions + corner[i]);
-    if (!part.primitive->normals.empty()) __builtin_prefetch(part.primitive->normals.data() + corner[i]);
+    __builtin_prefetch(part.positions + index[i]);
+    if (part.normals) __builtin_prefetch(part.normals + index[i]);
   }
 }
 
 void RayScene::cornersAt(const RayPacket& rays, int lane, HitCorners& hit) const {
   hit.part = partOf(rays, lane);
   const ScenePart& part = parts_[hit.part];
-  const std::vector<Vec3>& normals = part.primitive->normals;
-  const std::uint32_t* index = indicesAt(rays, lane);
+  const std::uint32_t* index = part.indices + std::size_t{3} * rays.rayhit.hit.primID[lane];
   for (std::size_t i = 0; i < 3; ++i) {
     hit.corners[i] = corner(part, index[i]);
-    hit.normals[i] = normals.empty() ? Vec3(0.0f) : normals[index[i]];
+    hit.normals[i] = part.normals ? part.normals[index[i]] : Vec3(0.0f);
   }
   hit.weights = {rays.rayhit.hit.u[lane], rays.rayhit.hit.v[lane]};
   hit.dir = rays.direction(lane);
@@ -361,12 +366,11 @@ HitSurface RayScene::surfaceAt(const RayPacket& rays, int lane) const {
 
 Vec3 RayScene::shadingNormal(const HitSurface& hit) const {
   const ScenePart& part = parts_[hit.part];
-  const auto& normals = part.primitive->normals;
-  if (normals.empty()) return hit.ng;
-  const std::uint32_t* index = part.primitive->indices.data() + std::size_t{3} * hit.point.triangle;
+  if (!part.normals) return hit.ng;
+  const std::uint32_t* index = part.indices + std::size_t{3} * hit.point.triangle;
   const Vec2 b = hit.point.barycentric;
-  const Vec3 n = part.worldFromNormal *
-                 ((1.0f - b.x - b.y) * normals[index[0]] + b.x * normals[index[1]] + b.y * normals[index[2]]);
+  const Vec3 n = part.worldFromNormal * ((1.0f - b.x - b.y) * part.normals[index[0]] + b.x * part.normals[index[1]] +
+                                         b.y * part.normals[index[2]]);
   const float length2 = glm::dot(n, n);
   if (!(length2 > 0.0f) || !std::isfinite(length2)) return hit.ng;
   const Vec3 unit = n / std::sqrt(length2);

@@ -195,7 +195,7 @@ void TexelMap::findTriangles(const RayPacket& packet, Lookup& lookup) const {
   if (placesInstances_)
     for (int lane = 0; lane < kLanes; ++lane) {
       const std::uint32_t part = lookup.parts[static_cast<std::size_t>(lane)];
-      if (part == none || rays_.parts()[part].worldPositions) continue;
+      if (part == none || rays_.parts()[part].isWorld) continue;
       const std::uint32_t bit = 1u << lane;
       lookup.behind = fromBehind(part, packet, lane) ? lookup.behind | bit : lookup.behind & ~bit;
     }

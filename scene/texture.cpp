@@ -172,8 +172,17 @@ Texture::Footprint Texture::footprint(const TextureRef& ref, Vec2 uv) const {
 }
 
 Vec4 Texture::sample(const Footprint& at) const {
-  const auto row = [&](int y) { return glm::mix(fetch(at.columns[0], y), fetch(at.columns[1], y), at.fx); };
-  return glm::mix(row(at.rows[0]), row(at.rows[1]), at.fy);
+  const auto mean = [&](const auto& valueAt) {
+    const auto row = [&](int y) { return glm::mix(valueAt(at.columns[0], y), valueAt(at.columns[1], y), at.fx); };
+    return glm::mix(row(at.rows[0]), row(at.rows[1]), at.fy);
+  };
+  if (bytes_.empty() || !opaque_) return mean([&](int x, int y) { return fetch(x, y); });
+  const Table& table = tableOf(space_);
+  return Vec4(mean([&](int x, int y) {
+                const std::uint8_t* rgb = &bytes_[3 * texelAt(x, y)];
+                return Vec3(table[rgb[0]], table[rgb[1]], table[rgb[2]]);
+              }),
+              1.0f);
 }
 
 float Texture::sampleAlpha(const TextureRef& ref, Vec2 uv) const {
