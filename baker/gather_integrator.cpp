@@ -145,7 +145,8 @@ Expected<void> GatherIntegrator::forEachWave(Progress& progress, Body body) {
   parallelFor(waves_.size(), 1, [&](std::size_t first, std::size_t last) {
     const FlushDenormals flush;
     for (std::size_t w = first; w < last && !progress.cancelled(); ++w) {
-      GatheredWave done = body(w);
+      GatheredWave done;
+      body(w, done);
       counts[w] = {done.rays, done.shadowRays, std::move(done.nonFinite)};
     }
   });
@@ -196,11 +197,10 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   std::vector<Vec3> first(count);     // light that needs no texel to be known: direct, and what rays see shine
   std::vector<Vec3> constant(count);  // the same and light from hits without texels
   std::vector<std::uint8_t> uneven(count);
-  auto traced = forEachWave(progress, [&](std::size_t w) {
+  auto traced = forEachWave(progress, [&](std::size_t w, GatheredWave& counts) {
     const Wave& wave = waves_[w];
     const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
     const std::size_t linkCount = std::size_t{wave.count} * GatherWave::kWarmRays;
-    GatheredWave counts;
     GatherWave texels(scene_, wave.page, wave.first, wave.count);
     std::array<CacheLink, std::size_t{kLanes} * GatherWave::kWarmRays> found;
     const auto warm = texels.warmUp(std::span(found).first(linkCount), counts);
@@ -216,7 +216,6 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
       direct_[start + i] = warm[i].direct;
       seen_[start + i] = warm[i].seen * static_cast<float>(GatherWave::kWarmRays);
     }
-    return counts;
   });
   if (!traced) return traced;
   std::fill(samplesOf_.begin(), samplesOf_.end(), std::uint32_t{GatherWave::kWarmRays});
@@ -336,24 +335,22 @@ void GatherIntegrator::makeGuides(const WarmLinks& links, std::span<const Packed
 }
 
 Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Progress& progress) {
-  auto traced = forEachWave(progress, [&](std::size_t w) {
+  auto traced = forEachWave(progress, [&](std::size_t w, GatheredWave& done) {
     const Wave& wave = waves_[w];
     const std::uint64_t samples = std::uint64_t{wave.count} * (end - first);
     if (wave.done) {
       progress.advance(samples);
-      return GatheredWave{};
+      return;
     }
     const std::size_t start = map_.firstOfPage(wave.page) + wave.first;
     const std::span buried = std::span(buried_).subspan(start, wave.count);
-    GatheredWave done;
     if (first == 0 || std::ranges::count(buried, 0) > 0) {
       GatherWave texels(scene_, wave.page, wave.first, wave.count);
-      done = texels.gather(first, end, cache_, buried, guides_.empty() ? Guide() : guides_[w], spreadsOf(w));
+      texels.gather(first, end, cache_, buried, guides_.empty() ? Guide() : guides_[w], spreadsOf(w), done);
       for (std::size_t i = 0; i < wave.count; ++i) coverage_[start + i] = texels.coverage(i);
     }
     store(w, done, first, end);
     progress.advance(samples);
-    return done;
   });
   if (!traced) return traced;
   if (first == 0) warmBacks_ = std::vector<std::uint8_t>();

@@ -224,7 +224,7 @@ float GatherWave::shareOf(const TriangleRef& triangle) const {
 void GatherWave::findAlbedos(std::size_t lane, WarmAlbedos& albedos) const {
   const Materials& materials = scene_.transport.materials;
   TriangleRef measured;
-  float uvWidth = 0.0f;
+  const Texture* texture = nullptr;
   for (std::uint32_t i = 0; i < kWarmLights; ++i) {
     const PlaceOnTriangle place = points_.place(lane, i);
     const TrianglePoint point = sourceOf(place);
@@ -232,10 +232,11 @@ void GatherWave::findAlbedos(std::size_t lane, WarmAlbedos& albedos) const {
       measured = place.triangle;
       // A mean would hold what is cut away. One over all that a point stands for would reach beyond the texel.
       const bool whole = materials.material(point.primitive->material).alphaMode == AlphaMode::Opaque;
-      uvWidth = whole ? materials.albedoWidth(point, 0.25f / kWarmLights * shareOf(measured)) : 0.0f;
+      const float uvWidth = whole ? materials.albedoWidth(point, 0.25f / kWarmLights * shareOf(measured)) : 0.0f;
+      texture = materials.albedoTexture(point.primitive->material, uvWidth);
     }
     albedos.points[i] = point;
-    albedos.lookups[i] = materials.findAlbedo(point, uvWidth);
+    albedos.lookups[i] = materials.findAlbedo(point, texture);
     albedos.lookups[i].prefetch();
   }
 }
@@ -325,16 +326,15 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   return texels;
 }
 
-GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
-                                std::span<const std::uint8_t> buried, const Guide& guide,
-                                std::span<LightSpread> spreads) {
-  GatheredWave result;
+void GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
+                        std::span<const std::uint8_t> buried, const Guide& guide, std::span<LightSpread> spreads,
+                        GatheredWave& result) {
   GatherSink sink{scene_, cache, result, page_, std::span(scene_.texels[page_].coords).subspan(first_, count_)};
   for (std::size_t lane = 0; lane < count_; ++lane)
     if (buried[lane]) points_.leaveOut(lane);
   for (std::size_t lane = 0; lane < count_; ++lane) covered_[lane] = points_.covered(lane);
   coveredCount_ = static_cast<std::size_t>(std::count(covered_.begin(), covered_.end(), true));
-  if (coveredCount_ == 0) return result;
+  if (coveredCount_ == 0) return;
   for (std::size_t lane = 0; lane < count_; ++lane)
     if ((first_ + lane) % PathIntegrator::kProbeStride == 0) sink.probedLane = lane;
   GatherTracer tracer(scene_.transport, scene_.map, scene_.reflectance, scene_.lastDepth, sink);
@@ -355,7 +355,6 @@ GatheredWave GatherWave::gather(std::uint32_t first, std::uint32_t end, std::spa
   result.rays += tracer.rays();
   result.shadowRays += tracer.shadowRays();
   sink.finish();
-  return result;
 }
 
 /// Light samples of each strategy, weighed so that they add up to as many as gather rays. Strategies of equal power are

@@ -133,9 +133,10 @@ class GatherWave {
   /// Samples [first, end) of every covered texel. `cache`: levels.count values per texel of the map, the radiance
   /// that the texel reflects. `buried`: one per texel of the wave; nothing is gathered for those. `guide`: leads the
   /// gather rays, the same in all passes. `spreads`: what the wave remembers of its light from pass to pass: of each of
-  /// GatherScene::strategies, and last of the gather rays; empty without strategies.
-  GatheredWave gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
-                      std::span<const std::uint8_t> buried, const Guide& guide, std::span<LightSpread> spreads);
+  /// GatherScene::strategies, and last of the gather rays; empty without strategies. `result`: empty before.
+  void gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
+              std::span<const std::uint8_t> buried, const Guide& guide, std::span<LightSpread> spreads,
+              GatheredWave& result);
 
  private:
   /// What a texel's reflectance is the mean of.

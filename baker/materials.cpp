@@ -91,14 +91,16 @@ float Materials::albedoWidth(const TrianglePoint& point, float share) const {
   return std::sqrt(share * uvAreaOf(point, material(point.primitive->material).baseColorMap.uvSet));
 }
 
-Materials::AlbedoLookup Materials::findAlbedo(const TrianglePoint& point, float uvWidth) const {
+const Texture* Materials::albedoTexture(int index, float uvWidth) const {
+  const TexturePyramid* textures = colorTexture(index);
+  if (textures == nullptr) return nullptr;
+  return uvWidth > 0.0f ? &textures->level(material(index).baseColorMap, uvWidth) : &textures->finest();
+}
+
+Materials::AlbedoLookup Materials::findAlbedo(const TrianglePoint& point, const Texture* texture) const {
   const Material& m = material(point.primitive->material);
-  AlbedoLookup lookup{Vec3(m.baseColor)};
-  if (const TexturePyramid* textures = colorTexture(point.primitive->material)) {
-    const TextureRef& ref = m.baseColorMap;
-    lookup.texture = uvWidth > 0.0f ? &textures->level(ref, uvWidth) : &textures->finest();
-    lookup.at = lookup.texture->footprint(ref, uvAt(point, ref.uvSet));
-  }
+  AlbedoLookup lookup{Vec3(m.baseColor), texture};
+  if (texture != nullptr) lookup.at = texture->footprint(m.baseColorMap, uvAt(point, m.baseColorMap.uvSet));
   if (!point.primitive->colors.empty()) lookup.factor *= Vec3(interpolate(point, point.primitive->colors));
   return lookup;
 }

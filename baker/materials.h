@@ -40,10 +40,14 @@ class Materials {
       if (texture != nullptr) texture->prefetch(at);
     }
   };
-  AlbedoLookup findAlbedo(const TrianglePoint& point) const { return findAlbedo(point, 0.0f); }
+  AlbedoLookup findAlbedo(const TrianglePoint& point) const {
+    return findAlbedo(point, albedoTexture(point.primitive->material, 0.0f));
+  }
   static Vec3 albedo(const AlbedoLookup& lookup);
-  /// Leads to the texture's mean about the point, over roughly `uvWidth` on a side.
-  AlbedoLookup findAlbedo(const TrianglePoint& point, float uvWidth) const;
+  /// `texture`: albedoTexture() of the point's material.
+  AlbedoLookup findAlbedo(const TrianglePoint& point, const Texture* texture) const;
+  /// Holds means of the base colour map over roughly `uvWidth` on a side; null: there is no map.
+  const Texture* albedoTexture(int material, float uvWidth) const;
   /// How wide `share` of a point's triangle is in the texture, as a square.
   float albedoWidth(const TrianglePoint& point, float share) const;
   /// Whether albedo() is the same on all of the primitive.

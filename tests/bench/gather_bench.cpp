@@ -288,7 +288,8 @@ void compare(benchmark::State& state, int place, std::uint32_t samples, std::opt
     for (std::size_t t = first; t < first + kLanes; ++t) naiveSum += gatherNaively(f, t, samples).flat.x;
   };
   const auto gatherWave = [&](std::size_t first) {
-    const GatheredWave done = GatherWave(scene, 0, first, kLanes).gather(0, samples, f.cache, kOpen, Guide(), {});
+    GatheredWave done;
+    GatherWave(scene, 0, first, kLanes).gather(0, samples, f.cache, kOpen, Guide(), {}, done);
     for (const GatheredTexel& texel : done.texels) gatherSum += texel.flat.x;
     rays += static_cast<double>(done.rays);
   };
@@ -337,8 +338,9 @@ void gather(benchmark::State& state) {
   for (auto _ : state)
     for (const std::size_t first : firsts) {
       GatherWave wave(f.scene, 0, first, kLanes);
-      rays += static_cast<std::int64_t>(
-          wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache, kOpen, Guide(), {}).rays);
+      GatheredWave done;
+      wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache, kOpen, Guide(), {}, done);
+      rays += static_cast<std::int64_t>(done.rays);
     }
   state.SetItemsProcessed(rays);
 }
