@@ -88,7 +88,7 @@ void WavePoints::addTexel(const RayScene& rays, const Atlas& atlas, const TexelF
   for (const TexelFootprint::Piece& from : footprint.pieces()) {
     const std::array<Vec2, 3>& c = from.barycentric;
     pieces_.push_back({firstSource + from.source, static_cast<float>(from.areaBefore), static_cast<float>(from.area),
-                       c[0], c[1] - c[0], c[2] - c[0]});
+                       c[0], c[1] - c[0], c[2] - c[0], from.isSquare});
   }
   LUMEL_CHECK(pieces_.size() > firstPiece_[lane]);
 }
@@ -107,7 +107,20 @@ bool WavePoints::turns(std::size_t lane) const {
   return false;
 }
 
-/// As TexelFootprint::sample: u.x chooses the piece, and what is left of it the reach within.
+/// Points of a texel that is all square: as TexelFootprint::sample.
+LUMEL_FOR_EACH_CPU void WavePoints::chooseInSquare(const Piece& square, std::uint32_t seed,
+                                                   const std::uint32_t* reversedIndices, Places& places) {
+  const Vec2 start = square.start, toSecond = square.toSecond, toThird = square.toThird;
+  const std::uint32_t source = square.source;
+  for (std::uint32_t i = 0; i < kMost; ++i) {
+    const Vec2 u = sobol2DOfReversed(reversedIndices[i], seed);
+    places.source[i] = source;
+    places.x[i] = within(start.x + u.x * toSecond.x + u.y * toThird.x, 0.0f, 1.0f);
+    places.y[i] = within(start.y + u.x * toSecond.y + u.y * toThird.y, 0.0f, 1.0f - places.x[i]);
+  }
+}
+
+/// Of any texel: u.x chooses the piece, and what is left of it the place within.
 LUMEL_FOR_EACH_CPU void WavePoints::choose(std::span<const Piece> pieces, float area, std::uint32_t seed,
                                            const std::uint32_t* reversedIndices, Places& places) {
   alignas(64) float target[kMost];
@@ -120,10 +133,12 @@ LUMEL_FOR_EACH_CPU void WavePoints::choose(std::span<const Piece> pieces, float 
   alignas(64) std::uint32_t source[kMost];
   alignas(64) float before[kMost], size[kMost], startX[kMost], startY[kMost];
   alignas(64) float secondX[kMost], secondY[kMost], thirdX[kMost], thirdY[kMost];
+  alignas(64) std::uint32_t square[kMost];
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     const Piece piece = pieces[k];
     // Pieces before the first one with points need no test.
     const float from = k == 0 ? -1.0f : piece.areaBefore;
+    const std::uint32_t isSquare = piece.isSquare ? 1 : 0;
     for (std::uint32_t i = 0; i < kMost; ++i) {
       const bool reached = target[i] >= from;
       source[i] = reached ? piece.source : source[i];
@@ -135,13 +150,16 @@ LUMEL_FOR_EACH_CPU void WavePoints::choose(std::span<const Piece> pieces, float 
       secondY[i] = pick(reached, piece.toSecond.y, secondY[i]);
       thirdX[i] = pick(reached, piece.toThird.x, thirdX[i]);
       thirdY[i] = pick(reached, piece.toThird.y, thirdY[i]);
+      square[i] = reached ? isSquare : square[i];
     }
   }
   for (std::uint32_t i = 0; i < kMost; ++i) {
     const float share = within((target[i] - before[i]) / size[i], 0.0f, 1.0f);
     const float reach = std::sqrt(share);
-    const float x = startX[i] + reach * ((1.0f - y[i]) * secondX[i] + y[i] * thirdX[i]);
-    const float z = startY[i] + reach * ((1.0f - y[i]) * secondY[i] + y[i] * thirdY[i]);
+    const float alongSecond = pick(square[i] != 0, share, reach * (1.0f - y[i]));
+    const float alongThird = pick(square[i] != 0, y[i], reach * y[i]);
+    const float x = startX[i] + alongSecond * secondX[i] + alongThird * thirdX[i];
+    const float z = startY[i] + alongSecond * secondY[i] + alongThird * thirdY[i];
     places.source[i] = source[i];
     places.x[i] = within(x, 0.0f, 1.0f);
     places.y[i] = within(z, 0.0f, 1.0f - places.x[i]);
@@ -230,8 +248,12 @@ void WavePoints::draw(const std::array<TexelSampler, kLanes>& samplers, std::uin
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (!active_[lane]) continue;
     Places& places = places_[lane];
-    choose(std::span(pieces_).subspan(firstPiece_[lane], firstPiece_[lane + 1] - firstPiece_[lane]),
-           static_cast<float>(areas_[lane]), samplers[lane].seedOf(pattern), reversedIndices, places);
+    const std::span pieces = std::span(pieces_).subspan(firstPiece_[lane], firstPiece_[lane + 1] - firstPiece_[lane]);
+    const std::uint32_t seed = samplers[lane].seedOf(pattern);
+    if (pieces.size() == 1 && pieces[0].isSquare)
+      chooseInSquare(pieces[0], seed, reversedIndices, places);
+    else
+      choose(pieces, static_cast<float>(areas_[lane]), seed, reversedIndices, places);
     for (std::uint32_t s = firstSource_[lane]; s < firstSource_[lane + 1]; ++s) {
       const Source& source = sources_[s];
       if (!locate(source, s, places, drawn_[lane]) || !turns_[lane]) continue;

@@ -71,12 +71,13 @@ class WavePoints {
     std::array<Vec3, 3> normals{};
     std::array<Vec4, 3> tangents{};
   };
-  /// A part of such a triangle: place = start + reach * (toSecond + uy * (toThird - toSecond)).
+  /// A part of such a triangle (TexelFootprint::Piece): its first corner, and the ways to the others.
   struct Piece {
     std::uint32_t source = 0;
     float areaBefore = 0.0f;
     float area = 0.0f;
     Vec2 start{0}, toSecond{0}, toThird{0};
+    bool isSquare = false;
   };
   /// The points of one texel: source, and the weights of its vertices 1 and 2.
   struct alignas(64) Places {
@@ -101,6 +102,8 @@ class WavePoints {
   void addTexel(const RayScene& rays, const Atlas& atlas, const TexelFootprint& footprint, std::size_t lane);
   bool turns(std::size_t lane) const;
   void setFrame(std::size_t lane, const Frame& frame, const Vec3& ng);
+  static void chooseInSquare(const Piece& square, std::uint32_t seed, const std::uint32_t* reversedIndices,
+                             Places& places);
   static void choose(std::span<const Piece> pieces, float area, std::uint32_t seed,
                      const std::uint32_t* reversedIndices, Places& places);
   static bool locate(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);

@@ -52,12 +52,6 @@ bool covers(const std::array<Vec2d, 3>& t, const Vec2d& centre) {
 
 Polygon clipToTexel(const std::array<Vec2d, 3>& triangle, TexelCoord texel) {
   Polygon polygon;
-  const double x = texel.x, y = texel.y;
-  if (covers(triangle, {x + 0.5, y + 0.5})) {
-    for (const Vec2d& corner : {Vec2d(x, y), Vec2d(x + 1, y), Vec2d(x + 1, y + 1), Vec2d(x, y + 1)})
-      polygon.add(corner);
-    return polygon;
-  }
   for (const Vec2d& p : triangle) polygon.add(p);
   const Vec2d least = glm::min(glm::min(triangle[0], triangle[1]), triangle[2]);
   const Vec2d most = glm::max(glm::max(triangle[0], triangle[1]), triangle[2]);
@@ -142,6 +136,15 @@ double TexelFootprint::clip(const Atlas& atlas, const PageTexels& page, std::siz
     const auto known = std::ranges::find(before_, ref, &Source::triangle);
     const auto source = static_cast<std::uint32_t>(sources_.size());
     sources_.push_back(known != before_.end() ? *known : sourceOf(ref));
+    const Vec2d corner(page.coords[texel].x, page.coords[texel].y);
+    if (covers(sources_.back().texels, corner + 0.5)) {
+      const std::array<Vec2, 3> barycentrics = {barycentricOf(sources_.back(), corner),
+                                                barycentricOf(sources_.back(), corner + Vec2d(1, 0)),
+                                                barycentricOf(sources_.back(), corner + Vec2d(0, 1))};
+      pieces_.push_back({source, barycentrics, area_, 1.0, true});
+      area_ += 1.0;
+      continue;
+    }
     const Polygon polygon = clipToTexel(sources_.back().texels, page.coords[texel]);
     if (polygon.count < 3) {
       sources_.pop_back();
@@ -154,7 +157,7 @@ double TexelFootprint::clip(const Atlas& atlas, const PageTexels& page, std::siz
       const Vec2d& first = polygon.corners[0];
       const double area = 0.5 * std::abs(cross(polygon.corners[i - 1] - first, polygon.corners[i] - first));
       if (!(area > 0)) continue;
-      pieces_.push_back({source, {barycentrics[0], barycentrics[i - 1], barycentrics[i]}, area_, area});
+      pieces_.push_back({source, {barycentrics[0], barycentrics[i - 1], barycentrics[i]}, area_, area, false});
       area_ += area;
     }
   }
@@ -167,35 +170,31 @@ SurfacePoint TexelFootprint::sample(Vec2 u) const {
   const auto next = std::upper_bound(pieces_.begin() + 1, pieces_.end(), target,
                                      [](double value, const Piece& piece) { return value < piece.areaBefore; });
   const Piece& piece = *(next - 1);
-  // What is left of u.x within the piece is uniform again. (r, u.y) -> triangle preserves area: lines of constant r
-  // are parallel to the side opposite to corner 0, and the triangle that they cut off at it has the share r.
+  // What is left of u.x within the piece is uniform again.
   const double r = std::clamp((target - piece.areaBefore) / piece.area, 0.0, 1.0);
-  const auto reach = static_cast<float>(std::sqrt(r));
   const std::array<Vec2, 3>& c = piece.barycentric;
+  if (piece.isSquare) return pointOn(piece, c[0] + static_cast<float>(r) * (c[1] - c[0]) + u.y * (c[2] - c[0]));
+  // (r, u.y) -> triangle preserves area: lines of constant r are parallel to the side opposite to corner 0, and the
+  // triangle that they cut off at it has the share r.
+  const auto reach = static_cast<float>(std::sqrt(r));
   return pointOn(piece, c[0] + reach * ((1.0f - u.y) * (c[1] - c[0]) + u.y * (c[2] - c[0])));
 }
 
 SurfacePoint TexelFootprint::centroid() const {
   LUMEL_CHECK(!pieces_.empty());
-  const auto texelsOf = [&](const Piece& piece) {
+  const auto onPage = [&](const Piece& piece, const Vec2d& w) {
     const std::array<Vec2d, 3>& t = sources_[piece.source].texels;
-    std::array<Vec2d, 3> points;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const Vec2d w(piece.barycentric[i]);
-      points[i] = t[0] + w.x * (t[1] - t[0]) + w.y * (t[2] - t[0]);
-    }
-    return points;
+    return t[0] + w.x * (t[1] - t[0]) + w.y * (t[2] - t[0]);
   };
   Vec2d mean(0);
-  for (const Piece& piece : pieces_) {
-    const auto t = texelsOf(piece);
-    mean += (piece.area / (3 * area_)) * (t[0] + t[1] + t[2]);
-  }
+  for (const Piece& piece : pieces_) mean += piece.area / area_ * onPage(piece, piece.middle());
   const Piece* nearest = nullptr;
   Vec2d nearestPoint(0);
   double leastDistance2 = std::numeric_limits<double>::infinity();
   for (const Piece& piece : pieces_) {
-    const Vec2d point = closestInTriangle(texelsOf(piece), mean);
+    const auto corner = [&](std::size_t i) { return onPage(piece, Vec2d(piece.barycentric[i])); };
+    const Vec2d point =
+        piece.isSquare ? onPage(piece, piece.middle()) : closestInTriangle({corner(0), corner(1), corner(2)}, mean);
     const double distance2 = glm::dot(point - mean, point - mean);
     if (distance2 >= leastDistance2) continue;
     leastDistance2 = distance2;

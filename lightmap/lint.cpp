@@ -290,7 +290,7 @@ class Linter {
       const TexelFootprint::Source& source = footprint.sources()[piece.source];
       if (chartOf(source.triangle) != chart) continue;
       const std::vector<Vec3>& p = atlas_.surfaces[source.triangle.surface].positions;
-      const Vec2d w = Vec2d(piece.barycentric[0] + piece.barycentric[1] + piece.barycentric[2]) / 3.0;
+      const Vec2d w = piece.middle();
       const Vec3d middle = (1 - w.x - w.y) * Vec3d(p[source.vertices[0]]) + w.x * Vec3d(p[source.vertices[1]]) +
                            w.y * Vec3d(p[source.vertices[2]]);
       low = glm::min(low, middle);

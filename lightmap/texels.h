@@ -50,8 +50,8 @@ struct SurfacePoint {
   Vec3 barycentric;  // of the triangle's three vertices
 };
 
-/// The covered part of one texel: its triangles clipped to the texel's square, as a fan of smaller triangles that can
-/// be sampled uniformly by area. Reused between texels to save allocation, and between neighbours triangles.
+/// The covered part of one texel: its triangles clipped to the texel's square, as pieces that can be sampled uniformly
+/// by area. Reused between texels to save allocation, and between neighbours triangles.
 class TexelFootprint {
  public:
   struct Source {  // a triangle of the texel
@@ -61,11 +61,18 @@ class TexelFootprint {
     std::array<Vec2d, 3> texels;  // its corners on the page, snapped (raster.h)
     Vec2d perTexel1, perTexel2;   // how the weights of vertices 1 and 2 grow across the page
   };
+  /// A triangle; or the whole square, of which three corners are kept: the fourth lies opposite of the first.
   struct Piece {
     std::uint32_t source = 0;         // into sources()
     std::array<Vec2, 3> barycentric;  // of the piece's corners: weights of vertices 1 and 2
     double areaBefore = 0.0;          // summed area of the pieces before this one
     double area = 0.0;
+    bool isSquare = false;
+
+    Vec2d middle() const {
+      const std::array<Vec2d, 3> c = {Vec2d(barycentric[0]), Vec2d(barycentric[1]), Vec2d(barycentric[2])};
+      return isSquare ? 0.5 * (c[1] + c[2]) : (c[0] + c[1] + c[2]) / 3.0;
+    }
   };
 
   /// Clips (Sutherland and Hodgman 1974) in double precision. Returns the covered area in texels, 0..1 (more than 1

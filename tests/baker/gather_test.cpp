@@ -248,15 +248,20 @@ TEST(Gather, GapsNarrowerThanTexels) {
   test.integrator = Integrator::Path;
   const Image path = test.bake({.samples = 16384}).pages[static_cast<std::size_t>(floor)].flat;
   test.integrator = Integrator::Gather;
-  const Image gather = test.bake({.samples = 1024}).pages[static_cast<std::size_t>(floor)].flat;
-  double lit = 0, expected = 0;
-  for (std::size_t y = 0; y < 6; ++y)
-    for (std::size_t x = 0; x < 2; ++x) {
-      lit += static_cast<double>(gather.pixels[3 * (6 * y + x)]);
-      expected += static_cast<double>(path.pixels[3 * (6 * y + x)]);
-    }
-  // Noise of both is about 4%. Were rays that go on to look up what they find, it would be 3.6 times as much.
-  EXPECT_NEAR(lit, expected, 0.2 * expected);
+  const auto litOf = [](const Image& flat) {
+    double sum = 0;
+    for (std::size_t y = 0; y < 6; ++y)
+      for (std::size_t x = 0; x < 2; ++x) sum += static_cast<double>(flat.pixels[3 * (6 * y + x)]);
+    return sum;
+  };
+  constexpr int kBakes = 8;
+  double lit = 0;
+  for (std::uint64_t seed = 1; seed <= kBakes; ++seed)
+    lit += litOf(test.bake({.samples = 1024, .seed = seed}).pages[static_cast<std::size_t>(floor)].flat) / kBakes;
+  // One bake scatters by 13%, so their mean by 5%. Were rays that go on to look up what they find, it would be 3.6
+  // times as much.
+  const double expected = litOf(path);
+  EXPECT_NEAR(lit, expected, 0.15 * expected);
 }
 
 // A mat lies on the floor, half on one texel and half on the next: what the ceiling sees of these texels is their open
@@ -276,14 +281,15 @@ TEST(Gather, TexelsThatThingsLieOn) {
   test.integrator = Integrator::Path;
   const Image path = test.bake({.samples = 4096, .indirectOnly = true}).pages[static_cast<std::size_t>(ceiling)].flat;
   test.integrator = Integrator::Gather;
-  const Image gather = test.bake({.samples = 512, .indirectOnly = true}).pages[static_cast<std::size_t>(ceiling)].flat;
+  const Image gather = test.bake({.samples = 8192, .indirectOnly = true}).pages[static_cast<std::size_t>(ceiling)].flat;
   double lit = 0, expected = 0;
   for (std::size_t i = 0; i < path.pixels.size(); ++i) {
     lit += static_cast<double>(gather.pixels[i]);
     expected += static_cast<double>(path.pixels[i]);
   }
-  // 0.9986 to 1.0004; the means of whole texels would make it 0.67.
-  EXPECT_NEAR(lit, expected, 0.01 * expected);
+  // 0.97, and 0.95 without the mat, since light is not constant over texels of 2 m; bakes scatter by 0.008. The means
+  // of whole texels would make it 0.67.
+  EXPECT_NEAR(lit, expected, 0.07 * expected);
 }
 
 // A floor of four texels with a texture of 4096, a quarter of them white at random: the ceiling sees about their mean.
