@@ -1,7 +1,9 @@
 #include "lightmap/denoise.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -205,6 +207,9 @@ void differencesOfRow(const Tile& tile, std::size_t first, std::ptrdiff_t shift,
   for (std::size_t m = 0; m < kMaps; ++m) light[m] = tile.luminances[m].data() + first;
   std::array<const float*, 3> trust{};
   for (std::size_t m = 0; m < 3; ++m) trust[m] = tile.flatByRnm[m].data() + first;
+  float* distance = raw.distance.data();
+  float* comparable = raw.comparable.data();
+#pragma GCC ivdep
   for (std::size_t k = 0; k < count; ++k) {
     const auto i = static_cast<std::ptrdiff_t>(k);
     const float noise = variance[i] + variance[i + shift];
@@ -215,9 +220,14 @@ void differencesOfRow(const Tile& tile, std::size_t first, std::ptrdiff_t shift,
     const float squares = d0 * d0 + 0.5f * (d1 * d1 * (trust[0][i] + trust[0][i + shift]) +
                                             d2 * d2 * (trust[1][i] + trust[1][i + shift]) +
                                             d3 * d3 * (trust[2][i] + trust[2][i + shift]));
-    const bool same = chart[i] != 0 && chart[i] == chart[i + shift];
-    raw.distance[k] = same ? squares / (static_cast<float>(kMaps) * noise) - 1.0f : 0.0f;
-    raw.comparable[k] = same ? 1.0f : 0.0f;
+    distance[k] = squares / (static_cast<float>(kMaps) * noise) - 1.0f;
+  }
+  // A loop of its own: as a choice in the one above, compilers would branch around the division.
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto i = static_cast<std::ptrdiff_t>(k);
+    const bool same = (chart[i] != 0) & (chart[i] == chart[i + shift]);
+    distance[k] = same ? distance[k] : 0.0f;
+    comparable[k] = same ? 1.0f : 0.0f;
   }
   for (std::size_t x = 0; x < width; ++x) {
     out.distance[x] = raw.distance[x] + raw.distance[x + 1] + raw.distance[x + 2];
@@ -264,9 +274,13 @@ Agreements::Agreements(const Tile& tile, int dx, int dy)
       const float agreement = 1.0f - std::max(distance / std::max(comparable, 1.0f), 0.0f) / kLargestDistance;
       const float cosine = nx[x] * nx[x + shift] + ny[x] * ny[x + shift] + nz[x] * nz[x + shift];
       const float facing = std::min(3.0f * cosine - 2.0f, 1.0f);  // 0 at 48 degrees
-      const bool shares = chart[x] != 0 && chart[x] == chart[x + shift] && facing > 0.0f && agreement > 0.0f;
-      const float both = agreement * facing;
-      to[k] = shares ? both * both : 0.0f;
+      const float both = (agreement > 0.0f ? agreement : 0.0f) * (facing > 0.0f ? facing : 0.0f);
+      to[k] = both * both;
+    }
+    for (std::size_t k = 0; k < stride; ++k) {
+      const auto x = static_cast<std::ptrdiff_t>(k);
+      const bool shares = (chart[x] != 0) & (chart[x] == chart[x + shift]);
+      to[k] = shares ? to[k] : 0.0f;
     }
   }
 }
@@ -286,8 +300,12 @@ LUMEL_FOR_EACH_CPU void addPair(const Tile& tile, int dx, int dy, Sums& sums) {
   const std::ptrdiff_t shift = dy * static_cast<std::ptrdiff_t>(tile.stride) + dx;
   const std::size_t width = tile.columns;
   const float unpaired = kUnpaired / static_cast<float>(dx * dx + dy * dy);
-  std::vector<float> aheads(width);
-  std::vector<float> behinds(width);
+  // Texels that do not count may hold anything, and zero times infinity is not zero: masks of bits put them out.
+  std::vector<float> aheads(width), behinds(width);
+  std::vector<std::uint32_t> aheadMasks(width), behindMasks(width);
+  const auto masked = [](float value, std::uint32_t mask) {
+    return std::bit_cast<float>(std::bit_cast<std::uint32_t>(value) & mask);
+  };
   for (std::size_t row = 0; row < tile.rows; ++row) {
     const float* ahead =
         agreements.weights.data() + (row + static_cast<std::size_t>(dy)) * agreements.stride + std::max(dx, 0);
@@ -300,15 +318,18 @@ LUMEL_FOR_EACH_CPU void addPair(const Tile& tile, int dx, int dy, Sums& sums) {
       sums.weight[to + x] += aheads[x] + behinds[x];
       sums.squaredWeight[to + x] += aheads[x] * aheads[x] + behinds[x] * behinds[x];
     }
+    for (std::size_t x = 0; x < width; ++x) {
+      aheadMasks[x] = aheads[x] > 0.0f ? ~0u : 0u;
+      behindMasks[x] = behinds[x] > 0.0f ? ~0u : 0u;
+    }
     const auto here = static_cast<std::ptrdiff_t>(tile.at(static_cast<std::ptrdiff_t>(row), 0));
     for (std::size_t c = 0; c < kColors; ++c) {
       const float* from = tile.colors[c].data() + here;
       float* sum = sums.colors[c].data() + to;
       for (std::size_t k = 0; k < width; ++k) {
         const auto x = static_cast<std::ptrdiff_t>(k);
-        const float next = aheads[k] > 0.0f ? aheads[k] * from[x + shift] : 0.0f;
-        const float last = behinds[k] > 0.0f ? behinds[k] * from[x - shift] : 0.0f;
-        sum[k] += next + last;
+        sum[k] +=
+            masked(aheads[k] * from[x + shift], aheadMasks[k]) + masked(behinds[k] * from[x - shift], behindMasks[k]);
       }
     }
   }
