@@ -128,8 +128,11 @@ SearchMask searchMask(const Bitmap& mask) {
 PackGrid::PackGrid(int width, int height, int border)
     : width_(width), height_(height), border_(border), stride_((width + 63) / 64 + 2) {
   const std::size_t size = static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height);
-  runs_.assign(kRunLevels, Level(size, 0));
-  squares_.assign(kSquareLevels, Level(size, 0));
+  Level empty(size, 0);
+  for (std::size_t i = static_cast<std::size_t>(stride_) - 1; i < size; i += static_cast<std::size_t>(stride_))
+    empty[i] = kAll;
+  runs_.assign(kRunLevels, empty);
+  squares_.assign(kSquareLevels, empty);
   squares_[0].clear();
   freeCells_ = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   for (int y = 0; y < height; ++y) {
@@ -156,21 +159,22 @@ void PackGrid::take(int y, int x0, int x1) {
 }
 
 void PackGrid::updateLevels(int firstWord, int lastWord, int firstRow, int lastRow) {
-  const auto shiftedOr = [&](const std::uint64_t* a, const std::uint64_t* b, int half, int i) {
-    const int word = i + half / 64;
-    const int bit = half % 64;
-    const auto read = [&](const std::uint64_t* p, int at) { return at < stride_ ? p[at] : kAll; };
-    const std::uint64_t low = read(a, word) | read(b, word);
-    if (bit == 0) return low;
-    return (low >> bit) | ((read(a, word + 1) | read(b, word + 1)) << (64 - bit));
+  // Whether any of a cell and that `half` cells to its right is taken. The last word of a row is all taken, and stays
+  // so.
+  const auto widen = [](const auto& taken, int half, int begin, int end, std::uint64_t* out) {
+    if (half == 64)
+      for (int i = begin; i < end; ++i) out[i] = taken(i) | taken(i + 1);
+    else
+      for (int i = begin; i < end; ++i) out[i] = taken(i) | taken(i) >> half | taken(i + 1) << (64 - half);
   };
+  const int end = std::min(lastWord, stride_ - 1);
   for (int level = 1; level < kRunLevels; ++level) {
     const int half = 1 << (level - 1);
     const int begin = std::max(0, firstWord - ((2 * half - 2) / 64 + 1));
     for (int y = firstRow; y < lastRow; ++y) {
       const std::uint64_t* below = row(runs_[static_cast<std::size_t>(level - 1)], y);
-      std::uint64_t* out = row(runs_[static_cast<std::size_t>(level)], y);
-      for (int i = begin; i < lastWord; ++i) out[i] = below[i] | shiftedOr(below, below, half, i);
+      const auto taken = [below](int i) { return below[i]; };
+      widen(taken, half, begin, end, row(runs_[static_cast<std::size_t>(level)], y));
     }
   }
   for (int level = 1; level < kSquareLevels; ++level) {
@@ -180,8 +184,8 @@ void PackGrid::updateLevels(int firstWord, int lastWord, int firstRow, int lastR
     for (int y = std::max(0, firstRow - 2 * half + 1); y < lastRow; ++y) {
       const std::uint64_t* upper = row(source, y);
       const std::uint64_t* lower = row(source, std::min(y + half, height_ - 1));
-      std::uint64_t* out = row(squares_[static_cast<std::size_t>(level)], y);
-      for (int i = begin; i < lastWord; ++i) out[i] = upper[i] | lower[i] | shiftedOr(upper, lower, half, i);
+      const auto taken = [upper, lower](int i) { return upper[i] | lower[i]; };
+      widen(taken, half, begin, end, row(squares_[static_cast<std::size_t>(level)], y));
     }
   }
 }
