@@ -28,6 +28,7 @@ struct Flight {
   Vec3 beta{0};           // weight of the radiance that this ray finds
   Vec3 origin{0};         // the surface point, before its offset
   float pdf = 0.0f;       // with which this ray's direction would be gathered, for the weight against light samples
+  float chance = 0.0f;    // 0..1: decides whether the hit at its end is shaded, should it need that; after one such hit
 };
 
 /// Sink receives what rays find, in an order that depends on the rays alone:
@@ -42,7 +43,9 @@ class GatherTracer {
   /// empty. It is what the back of a surface with a lightmap reflects, as its front does.
   GatherTracer(const LightTransport& transport, const TexelMap& map, std::span<const PackedColor> reflectance,
                int lastDepth, Sink& sink)
-      : transport_(transport), map_(map), reflectance_(reflectance), lastDepth_(lastDepth), sink_(sink) {}
+      : transport_(transport), map_(map), reflectance_(reflectance), lastDepth_(lastDepth), sink_(sink) {
+    spots_.reserve(kManySpots + kLanes);
+  }
 
   /// What the rays of a packet found; flightOf(lane) tells of each.
   template <class FlightOf>
@@ -90,13 +93,13 @@ class GatherTracer {
   void advance() {
     do {
       step();
-    } while (waiting_ >= kManySpots);
+    } while (spots_.size() >= kManySpots);
   }
   /// Follows all.
   void finish() {
-    while (stage_ != Stage::Idle || waiting_ >= kLanes) step();
-    while (waiting_ > 0) {
-      shade(std::min<std::size_t>(kLanes, waiting_));
+    while (stage_ != Stage::Idle || spots_.size() >= kLanes) step();
+    while (!spots_.empty()) {
+      shade(std::min<std::size_t>(kLanes, spots_.size()));
       while (stage_ != Stage::Idle) step();
     }
   }
@@ -115,11 +118,6 @@ class GatherTracer {
   static constexpr int kRouletteAfter = 1;
   static constexpr std::uint32_t kDirection = kLightPatterns;
   static constexpr std::uint32_t kRoulette = kLightPatterns + 1;
-
-  /// One sequence for all samples of a texel that are shaded after so many hits.
-  static TexelSampler samplerAt(const Flight& flight) {
-    return {flight.key, static_cast<std::uint32_t>(flight.depth), 0u, 0u};
-  }
 
   void findEmission(const RayPacket& packet, int lane, const Flight& flight) {
     const HitSurface hit = transport_.rays.surfaceAt(packet, lane);
@@ -145,12 +143,11 @@ class GatherTracer {
     Vec3 beta = flight.beta * albedo;
     if (flight.depth >= kRouletteAfter) {
       const float survival = std::max(most, 0.05f);
-      if (samplerAt(flight).get1D(flight.sample, kRoulette) >= survival) return;
+      if (flight.chance >= survival) return;
       beta /= survival;
     }
     // Made in its place: a copy would wait for what was just written.
-    if (waiting_ == spots_.size()) spots_.resize(2 * spots_.size() + kManySpots);
-    Spot& spot = spots_[waiting_++];
+    Spot& spot = spots_.emplace_back();
     spot.flight = flight;
     spot.flight.beta = beta;
     transport_.rays.cornersAt(packet, lane, spot.hit);
@@ -159,7 +156,7 @@ class GatherTracer {
   void step() {
     switch (stage_) {
       case Stage::Idle:
-        if (waiting_ >= kLanes) shade(kLanes);
+        if (spots_.size() >= kLanes) shade(kLanes);
         break;
       case Stage::Traced:
         map_.findPixels(packet_, lookup_);
@@ -188,15 +185,16 @@ class GatherTracer {
     SampleLanes samples;
     std::array<std::uint32_t, kLanes> keys{}, depths{};
     for (std::size_t lane = 0; lane < count; ++lane) {
-      const Spot& spot = spots_[waiting_ - count + lane];
+      const Spot& spot = spots_[spots_.size() - count + lane];
       transport_.rays.set(hits, lane, spot.hit);
       flights_[lane] = spot.flight;
       keys[lane] = spot.flight.key;
       depths[lane] = static_cast<std::uint32_t>(spot.flight.depth);
       samples.setSample(static_cast<int>(lane), spot.flight.sample);
     }
-    samples.setTexels(keys.data(), depths.data());  // as samplerAt
-    waiting_ -= count;
+    // One sequence for all samples of a texel that are shaded after so many hits.
+    samples.setTexels(keys.data(), depths.data());
+    spots_.resize(spots_.size() - count);
     Vec3Lanes p, ng, ns, rayStart;
     receiveAt(hits, p, ng, ns, rayStart);
     const ReceiverLanes receivers{hits.active, p, ng, ns, rayStart};
@@ -208,11 +206,13 @@ class GatherTracer {
                     });
     alignas(64) float pdf[kLanes];
     aimByCosine(receivers, samples.draw2D(kDirection), packet_, pdf);
+    const UnitLanes chances = samples.draw1D(kRoulette);
     for (std::size_t lane = 0; lane < count; ++lane) {
       if (!packet_.valid[lane]) continue;
       ++flights_[lane].depth;
       flights_[lane].origin = p[lane];
       flights_[lane].pdf = pdf[lane];
+      flights_[lane].chance = chances.u[lane];
       ++rays_;
     }
     transport_.rays.intersect(packet_, TraceMode::Packet);
@@ -225,8 +225,7 @@ class GatherTracer {
   const std::span<const PackedColor> reflectance_;
   const int lastDepth_;
   Sink& sink_;
-  std::vector<Spot> spots_;  // the first `waiting_` are left to be shaded; places are used again as they are
-  std::size_t waiting_ = 0;
+  std::vector<Spot> spots_;  // left to be shaded
   // Rays that go on, and what is known of where they ended.
   Stage stage_ = Stage::Idle;
   RayPacket packet_;
