@@ -193,8 +193,7 @@ SurfacePoint TexelFootprint::centroid() const {
   double leastDistance2 = std::numeric_limits<double>::infinity();
   for (const Piece& piece : pieces_) {
     const auto corner = [&](std::size_t i) { return onPage(piece, Vec2d(piece.barycentric[i])); };
-    const Vec2d point =
-        piece.isSquare ? onPage(piece, piece.middle()) : closestInTriangle({corner(0), corner(1), corner(2)}, mean);
+    const Vec2d point = piece.isSquare ? mean : closestInTriangle({corner(0), corner(1), corner(2)}, mean);
     const double distance2 = glm::dot(point - mean, point - mean);
     if (distance2 >= leastDistance2) continue;
     leastDistance2 = distance2;

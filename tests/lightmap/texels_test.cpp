@@ -313,6 +313,22 @@ TEST(Footprint, StratifiedInputStaysStratified) {
     }
 }
 
+TEST(Footprint, WholeTexelsAreSampledAsSquares) {
+  const Atlas atlas = atlasOf({{Vec2(1, 1), Vec2(9, 2), Vec2(2, 9)}});
+  const PageTexels page = findTexels(atlas)[0];
+  TexelFootprint footprint;
+  int whole = 0;
+  for (std::size_t i = 0; i < page.size(); ++i) {
+    if (footprint.clip(atlas, page, i) != 1.0) continue;
+    ++whole;
+    const Vec2 u(0.3f, 0.8f);
+    const Vec3 p = footprint.sample(u).position;  // its x and y are texels
+    EXPECT_NEAR(p.x, page.coords[i].x + u.x, 1e-5f);
+    EXPECT_NEAR(p.y, page.coords[i].y + u.y, 1e-5f);
+  }
+  EXPECT_GT(whole, 10);
+}
+
 TEST(Footprint, CentroidOfWholeTexelIsItsMiddleAndLiesOnTheSurface) {
   const Atlas square = atlasOf({{Vec2(0, 0), Vec2(4, 0), Vec2(4, 4)}, {Vec2(0, 0), Vec2(4, 4), Vec2(0, 4)}});
   const PageTexels page = findTexels(square)[0];
