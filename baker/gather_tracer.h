@@ -28,7 +28,7 @@ struct Flight {
   Vec3 beta{0};           // weight of the radiance that this ray finds
   Vec3 origin{0};         // the surface point, before its offset
   float pdf = 0.0f;       // with which this ray's direction would be gathered, for the weight against light samples
-  float chance = 0.0f;    // 0..1: decides whether the hit at its end is shaded, should it need that; after one such hit
+  float chance = 0.0f;    // uniform in [0, 1), of rays from hits: decides the roulette where this one ends
 };
 
 /// Sink receives what rays find, in an order that depends on the rays alone:
@@ -131,7 +131,7 @@ class GatherTracer {
   Vec3 albedoOf(const RayPacket& packet, int lane, const TexelMap::Lookup& lookup) const {
     const auto l = static_cast<std::size_t>(lane);
     const ScenePart& part = transport_.rays.parts()[lookup.parts[l]];
-    if (part.hasOneAlbedo) return part.albedo;
+    if (part.albedo) return *part.albedo;
     if (reflectance_.empty() || lookup.texels[l] == kNoTexel)
       return transport_.materials.albedo(transport_.rays.pointAt(packet, lane));
     return unpackColor(reflectance_[lookup.texels[l]]);

@@ -163,8 +163,7 @@ std::uint32_t RayScene::addParts(int instanceIndex) {
     part.positions = primitive.positions.data();
     part.normals = primitive.normals.empty() ? nullptr : primitive.normals.data();
     part.doubleSided = materials_->material(primitive.material).doubleSided;
-    part.hasOneAlbedo = materials_->hasOneAlbedo(primitive);
-    if (part.hasOneAlbedo) part.albedo = materials_->albedo({&primitive});
+    if (materials_->hasOneAlbedo(primitive)) part.albedo = materials_->albedo({&primitive});
     part.primitive = &primitive;
     part.instance = instanceIndex;
     part.worldFromObject = instance.worldFromObject;

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "baker/materials.h"
@@ -64,8 +65,7 @@ struct alignas(64) ScenePart {
   const Vec3* normals = nullptr;    // of the primitive; null: it has none
   bool isWorld = false;             // positions are Embree's vertex buffer
   bool doubleSided = false;
-  bool hasOneAlbedo = false;  // throughout, which is
-  Vec3 albedo{0};
+  std::optional<Vec3> albedo;  // where it is the same throughout
   const Primitive* primitive = nullptr;
   int instance = 0;
   Mat4 worldFromObject{1.0f};

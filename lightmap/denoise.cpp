@@ -1,9 +1,7 @@
 #include "lightmap/denoise.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -300,12 +298,8 @@ LUMEL_FOR_EACH_CPU void addPair(const Tile& tile, int dx, int dy, Sums& sums) {
   const std::ptrdiff_t shift = dy * static_cast<std::ptrdiff_t>(tile.stride) + dx;
   const std::size_t width = tile.columns;
   const float unpaired = kUnpaired / static_cast<float>(dx * dx + dy * dy);
-  // Texels that do not count may hold anything, and zero times infinity is not zero: masks of bits put them out.
-  std::vector<float> aheads(width), behinds(width);
-  std::vector<std::uint32_t> aheadMasks(width), behindMasks(width);
-  const auto masked = [](float value, std::uint32_t mask) {
-    return std::bit_cast<float>(std::bit_cast<std::uint32_t>(value) & mask);
-  };
+  std::vector<float> aheads(width);
+  std::vector<float> behinds(width);
   for (std::size_t row = 0; row < tile.rows; ++row) {
     const float* ahead =
         agreements.weights.data() + (row + static_cast<std::size_t>(dy)) * agreements.stride + std::max(dx, 0);
@@ -318,18 +312,15 @@ LUMEL_FOR_EACH_CPU void addPair(const Tile& tile, int dx, int dy, Sums& sums) {
       sums.weight[to + x] += aheads[x] + behinds[x];
       sums.squaredWeight[to + x] += aheads[x] * aheads[x] + behinds[x] * behinds[x];
     }
-    for (std::size_t x = 0; x < width; ++x) {
-      aheadMasks[x] = aheads[x] > 0.0f ? ~0u : 0u;
-      behindMasks[x] = behinds[x] > 0.0f ? ~0u : 0u;
-    }
     const auto here = static_cast<std::ptrdiff_t>(tile.at(static_cast<std::ptrdiff_t>(row), 0));
     for (std::size_t c = 0; c < kColors; ++c) {
       const float* from = tile.colors[c].data() + here;
       float* sum = sums.colors[c].data() + to;
       for (std::size_t k = 0; k < width; ++k) {
         const auto x = static_cast<std::ptrdiff_t>(k);
-        sum[k] +=
-            masked(aheads[k] * from[x + shift], aheadMasks[k]) + masked(behinds[k] * from[x - shift], behindMasks[k]);
+        const float next = aheads[k] > 0.0f ? aheads[k] * from[x + shift] : 0.0f;
+        const float last = behinds[k] > 0.0f ? behinds[k] * from[x - shift] : 0.0f;
+        sum[k] += next + last;
       }
     }
   }
