@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "baker/command_line.h"
+#include "baker/commands/command_line.h"
 
 namespace {
 

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "scene/math.h"
+#include "scene/base/math.h"
 
 namespace lumel {
 

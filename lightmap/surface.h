@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "scene/math.h"
+#include "scene/base/math.h"
 #include "scene/scene.h"
 
 namespace lumel {

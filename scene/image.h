@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "scene/math.h"
+#include "scene/base/math.h"
 
 namespace lumel {
 

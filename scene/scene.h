@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "scene/base/math.h"
 #include "scene/image.h"
-#include "scene/math.h"
 
 namespace lumel {
 

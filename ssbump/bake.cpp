@@ -4,10 +4,10 @@
 #include <cmath>
 #include <optional>
 
-#include "scene/check.h"
-#include "scene/parallel.h"
-#include "scene/stopwatch.h"
-#include "ssbump/bilateral.h"
+#include "scene/base/check.h"
+#include "scene/base/parallel.h"
+#include "scene/base/stopwatch.h"
+#include "ssbump/occlusion/bilateral.h"
 
 namespace lumel::ssbump {
 namespace {

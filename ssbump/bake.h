@@ -5,11 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "scene/progress.h"
-#include "ssbump/height_field.h"
-#include "ssbump/horizon.h"
-#include "ssbump/map_set.h"
-#include "ssbump/ray_occlusion.h"
+#include "scene/base/progress.h"
+#include "ssbump/maps/bake_report.h"
+#include "ssbump/maps/map_set.h"
+#include "ssbump/occlusion/height_field.h"
+#include "ssbump/occlusion/horizon.h"
+#include "ssbump/occlusion/ray_occlusion.h"
 
 namespace lumel::ssbump {
 
@@ -26,14 +27,6 @@ struct BakeSettings {
   RaySettings rays;
   MapSettings maps;
   int tileWidth = 2048, tileHeight = 1024;  // even; results do not depend on them
-};
-
-struct BakeReport {
-  int width = 0, height = 0;
-  float lowestTexels = 0, highestTexels = 0;
-  int reachTexels = 0;
-  double prepareSeconds = 0, occlusionSeconds = 0;
-  std::vector<std::string> warnings;
 };
 
 /// Everything from files to files. Errors: Input, Usage, Failed, Interrupted; none leaves a file behind.

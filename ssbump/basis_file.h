@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <vector>
 
-#include "scene/expected.h"
-#include "scene/math.h"
+#include "scene/base/expected.h"
+#include "scene/base/math.h"
 
 namespace lumel::ssbump {
 

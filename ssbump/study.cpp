@@ -7,11 +7,11 @@
 #include <functional>
 #include <numeric>
 
-#include "scene/image_io.h"
-#include "ssbump/block_compression.h"
+#include "scene/images/image_io.h"
 #include "ssbump/contact_sheet.h"
-#include "ssbump/mip.h"
-#include "ssbump/weights.h"
+#include "ssbump/maps/block_compression.h"
+#include "ssbump/maps/mip.h"
+#include "ssbump/maps/weights.h"
 
 namespace lumel::ssbump {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "scene/expected.h"
+#include "scene/base/expected.h"
+#include "scene/base/progress.h"
 #include "scene/image.h"
-#include "scene/progress.h"
 
 namespace lumel::ssbump {
 

@@ -1,12 +1,12 @@
-#include "baker/bake_files.h"
+#include "baker/files/write/bake_files.h"
 
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <set>
 
-#include "baker/baked_scene.h"
-#include "scene/file_set.h"
+#include "baker/files/read/baked_scene.h"
+#include "scene/files/file_set.h"
 #include "tests/mentions.h"
 #include "tests/scratch.h"
 

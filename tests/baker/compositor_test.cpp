@@ -1,7 +1,7 @@
 // Stills and the viewpoint for scenes without a camera.
 #include <gtest/gtest.h>
 
-#include "baker/viewpoint.h"
+#include "baker/stills/viewpoint.h"
 #include "test_scene.h"
 
 namespace lumel {

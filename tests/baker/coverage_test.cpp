@@ -4,7 +4,7 @@
 
 #include <cstdio>
 
-#include "baker/doubling_error.h"
+#include "baker/gather/doubling_error.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {

@@ -1,7 +1,7 @@
 // Direct light on a rectangle against closed forms, flat and all three raw RNM maps.
 #include <gtest/gtest.h>
 
-#include "scene/environment.h"
+#include "scene/images/environment.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {

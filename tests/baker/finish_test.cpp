@@ -1,4 +1,4 @@
-#include "baker/finish.h"
+#include "baker/bake/finish.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "baker/gather_guide.h"
+#include "baker/gather/gather_guide.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <limits>
 #include <memory>
 
-#include "baker/gather_kernels.h"
+#include "baker/gather/gather_kernels.h"
 
 namespace lumel {
 namespace {

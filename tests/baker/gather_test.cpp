@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "baker/stratified_net.h"
+#include "baker/rays/stratified_net.h"
 #include "tests/baker/test_scene.h"
 #include "tests/mentions.h"
 

@@ -1,5 +1,5 @@
 // scene.glb: written from plain data and read back by the loader.
-#include "baker/glb_writer.h"
+#include "baker/files/write/glb_writer.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "scene/image_io.h"
-#include "scene/load_scene.h"
+#include "scene/images/image_io.h"
+#include "scene/load/load_scene.h"
 #include "tests/scratch.h"
 
 namespace lumel {

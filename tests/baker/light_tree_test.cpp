@@ -1,12 +1,12 @@
 // The choice among many lights: its densities add up to one, are those of the samples, and leave no light out.
-#include "baker/light_tree.h"
+#include "baker/light/light_tree.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "baker/lights.h"
+#include "baker/light/lights.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {

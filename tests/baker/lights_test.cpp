@@ -1,14 +1,14 @@
 // Densities of light sampling: what sample() states must be what pdf() answers for the same direction.
-#include "baker/lights.h"
+#include "baker/light/lights.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "baker/environment_light.h"
-#include "baker/sampling.h"
-#include "scene/environment.h"
-#include "scene/sobol.h"
+#include "baker/light/environment_light.h"
+#include "baker/rays/sampling.h"
+#include "scene/base/sobol.h"
+#include "scene/images/environment.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {

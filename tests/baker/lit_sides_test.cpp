@@ -1,4 +1,4 @@
-#include "baker/lit_sides.h"
+#include "baker/bake/lit_sides.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
-#include "baker/packed_color.h"
+#include "baker/gather/packed_color.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "scene/sobol.h"
+#include "scene/base/sobol.h"
 
 namespace lumel {
 namespace {

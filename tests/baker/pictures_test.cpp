@@ -3,8 +3,8 @@
 
 #include <limits>
 
-#include "baker/image_figures.h"
-#include "baker/tone_map.h"
+#include "baker/commands/image_figures.h"
+#include "baker/stills/tone_map.h"
 
 namespace lumel {
 namespace {

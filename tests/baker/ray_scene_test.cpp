@@ -1,12 +1,12 @@
-#include "baker/ray_scene.h"
+#include "baker/rays/ray_scene.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "baker/gather_wave.h"
-#include "baker/sampling.h"
-#include "scene/sobol.h"
+#include "baker/gather/gather_wave.h"
+#include "baker/rays/sampling.h"
+#include "scene/base/sobol.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {

@@ -1,4 +1,4 @@
-#include "baker/sample_lanes.h"
+#include "baker/rays/sample_lanes.h"
 
 #include <gtest/gtest.h>
 

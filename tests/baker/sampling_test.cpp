@@ -1,13 +1,13 @@
-#include "baker/sampling.h"
+#include "baker/rays/sampling.h"
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <vector>
 
-#include "baker/distribution.h"
-#include "lightmap/rnm_basis.h"
-#include "scene/sobol.h"
+#include "baker/light/distribution.h"
+#include "lightmap/maps/rnm_basis.h"
+#include "scene/base/sobol.h"
 
 namespace lumel {
 namespace {

@@ -1,14 +1,14 @@
 // The study's figures on a small scene, and its plots.
-#include "baker/study.h"
+#include "baker/study/study.h"
 
 #include <gtest/gtest.h>
 
 #include <map>
 
-#include "baker/plot.h"
-#include "baker/quality.h"
-#include "baker/study_files.h"
-#include "scene/load_scene.h"
+#include "baker/bake/quality.h"
+#include "baker/study/plot.h"
+#include "baker/study/study_files.h"
+#include "scene/load/load_scene.h"
 #include "tests/mentions.h"
 
 namespace lumel {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "scene/parallel.h"
+#include "scene/base/parallel.h"
 
 namespace lumel::testing_scene {
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "baker/bake.h"
-#include "scene/image_io.h"
+#include "baker/bake/bake.h"
+#include "scene/images/image_io.h"
 
 namespace lumel::testing_scene {
 

@@ -1,11 +1,11 @@
-#include "baker/texel_cache.h"
+#include "baker/gather/texel_cache.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <map>
 
-#include "scene/sobol.h"
+#include "scene/base/sobol.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {

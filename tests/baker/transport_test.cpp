@@ -2,7 +2,7 @@
 // closed rooms, and the figures that it reports.
 #include <gtest/gtest.h>
 
-#include "baker/ray_scene.h"
+#include "baker/rays/ray_scene.h"
 #include "tests/baker/test_scene.h"
 #include "tests/mentions.h"
 

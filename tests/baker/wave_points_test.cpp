@@ -1,4 +1,4 @@
-#include "baker/wave_points.h"
+#include "baker/gather/wave_points.h"
 
 #include <gtest/gtest.h>
 

@@ -9,14 +9,14 @@
 
 #include <unistd.h>
 
-#include "baker/bake.h"
-#include "baker/direct_light.h"
-#include "baker/finish.h"
-#include "baker/sample_lanes.h"
-#include "baker/texel_sums.h"
-#include "lightmap/projection.h"
-#include "scene/image_io.h"
-#include "scene/parallel.h"
+#include "baker/bake/bake.h"
+#include "baker/bake/finish.h"
+#include "baker/light/direct_light.h"
+#include "baker/path/texel_sums.h"
+#include "baker/rays/sample_lanes.h"
+#include "lightmap/maps/projection.h"
+#include "scene/base/parallel.h"
+#include "scene/images/image_io.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {

@@ -15,7 +15,7 @@
 #include <map>
 #include <optional>
 
-#include "baker/gather_wave.h"
+#include "baker/gather/gather_wave.h"
 #include "tests/bench/gather_scenes.h"
 
 namespace lumel {

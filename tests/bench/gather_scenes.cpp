@@ -1,7 +1,7 @@
 #include "tests/bench/gather_scenes.h"
 
-#include "scene/check.h"
-#include "scene/sobol.h"
+#include "scene/base/check.h"
+#include "scene/base/sobol.h"
 
 namespace lumel::bench_scenes {
 namespace {

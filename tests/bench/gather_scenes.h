@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "baker/light_transport.h"
+#include "baker/light/light_transport.h"
 #include "lightmap/surface.h"
-#include "lightmap/texels.h"
+#include "lightmap/texels/texels.h"
 #include "scene/scene.h"
 
 namespace lumel::bench_scenes {

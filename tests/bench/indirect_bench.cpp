@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "baker/bake.h"
-#include "baker/finish.h"
-#include "scene/check.h"
+#include "baker/bake/bake.h"
+#include "baker/bake/finish.h"
+#include "scene/base/check.h"
 #include "tests/bench/gather_scenes.h"
 
 namespace lumel {

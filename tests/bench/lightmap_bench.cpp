@@ -5,12 +5,12 @@
 #include <cmath>
 #include <random>
 
-#include "lightmap/denoise.h"
-#include "lightmap/dilate.h"
-#include "lightmap/pack.h"
-#include "lightmap/projection.h"
-#include "lightmap/texels.h"
-#include "scene/parallel.h"
+#include "lightmap/maps/denoise.h"
+#include "lightmap/maps/dilate.h"
+#include "lightmap/maps/projection.h"
+#include "lightmap/pack/pack.h"
+#include "lightmap/texels/texels.h"
+#include "scene/base/parallel.h"
 
 namespace lumel {
 namespace {

@@ -9,9 +9,9 @@
 #include <map>
 #include <numeric>
 
-#include "scene/parallel.h"
-#include "ssbump/horizon.h"
-#include "ssbump/ray_occlusion.h"
+#include "scene/base/parallel.h"
+#include "ssbump/occlusion/horizon.h"
+#include "ssbump/occlusion/ray_occlusion.h"
 #include "tests/ssbump/fields.h"
 
 namespace lumel::ssbump {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene/image_io.h"
+#include "scene/images/image_io.h"
 #include "tests/cli/harness.h"
 #include "tests/mentions.h"
 

@@ -1,7 +1,7 @@
 // What a user meets who makes a mistake: an exit code for scripts and one line that says what, where and what to do.
 #include <gtest/gtest.h>
 
-#include "scene/image_io.h"
+#include "scene/images/image_io.h"
 #include "tests/cli/harness.h"
 
 namespace lumel::cli {

@@ -2,7 +2,7 @@
 // A limit on the size of files stands for the disk: it needs no rights, and writes fail in the same places.
 #include <gtest/gtest.h>
 
-#include "scene/image_io.h"
+#include "scene/images/image_io.h"
 #include "tests/cli/harness.h"
 #include "tests/mentions.h"
 

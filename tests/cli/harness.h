@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "scene/math.h"
+#include "scene/base/math.h"
 #include "tests/scratch.h"
 
 namespace lumel::cli {

@@ -8,8 +8,8 @@
 #include <iterator>
 #include <sstream>
 
-#include "baker/command_line.h"
-#include "scene/image_io.h"
+#include "baker/commands/command_line.h"
+#include "scene/images/image_io.h"
 #include "tests/cli/harness.h"
 #include "tests/mentions.h"
 #include "tests/ssbump/fields.h"

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "scene/stopwatch.h"
+#include "scene/base/stopwatch.h"
 #include "tests/lightmap/chart_checks.h"
 
 namespace lumel {

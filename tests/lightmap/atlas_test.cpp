@@ -1,11 +1,11 @@
-#include "lightmap/atlas.h"
+#include "lightmap/atlas/atlas.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "lightmap/pack_shape.h"
-#include "scene/parallel.h"
+#include "lightmap/pack/pack_shape.h"
+#include "scene/base/parallel.h"
 #include "tests/lightmap/chart_checks.h"
 #include "tests/lightmap/test_shapes.h"
 

@@ -1,5 +1,5 @@
 // Lightmap UVs that the scene brings along.
-#include "lightmap/atlas.h"
+#include "lightmap/atlas/atlas.h"
 
 #include <gtest/gtest.h>
 

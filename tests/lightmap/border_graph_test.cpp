@@ -1,4 +1,4 @@
-#include "lightmap/border_graph.h"
+#include "lightmap/charts/border_graph.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // What every atlas must hold, measured from its surfaces alone.
 #pragma once
 
-#include "lightmap/atlas.h"
+#include "lightmap/atlas/atlas.h"
 
 namespace lumel {
 

@@ -1,5 +1,5 @@
 // What may join a chart: squeezed small charts, and parts that would share texels with far ones.
-#include "lightmap/chart_sheet.h"
+#include "lightmap/charts/chart_sheet.h"
 
 #include <gtest/gtest.h>
 

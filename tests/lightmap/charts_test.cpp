@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "lightmap/atlas.h"
-#include "lightmap/pack_shape.h"
+#include "lightmap/atlas/atlas.h"
+#include "lightmap/pack/pack_shape.h"
 #include "tests/lightmap/chart_checks.h"
 #include "tests/lightmap/test_shapes.h"
 

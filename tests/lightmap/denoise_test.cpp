@@ -1,4 +1,4 @@
-#include "lightmap/denoise.h"
+#include "lightmap/maps/denoise.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "scene/parallel.h"
+#include "scene/base/parallel.h"
 
 namespace lumel {
 namespace {

@@ -1,4 +1,4 @@
-#include "lightmap/dilate.h"
+#include "lightmap/maps/dilate.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "scene/parallel.h"
+#include "scene/base/parallel.h"
 
 namespace lumel {
 namespace {

@@ -1,5 +1,5 @@
 // Layouts that are remembered from one bake to the next.
-#include "lightmap/atlas.h"
+#include "lightmap/atlas/atlas.h"
 
 #include <gtest/gtest.h>
 

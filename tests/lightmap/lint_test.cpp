@@ -1,4 +1,4 @@
-#include "lightmap/lint.h"
+#include "lightmap/atlas/lint.h"
 
 #include <gtest/gtest.h>
 

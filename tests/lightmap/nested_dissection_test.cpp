@@ -1,4 +1,4 @@
-#include "lightmap/nested_dissection.h"
+#include "lightmap/charts/nested_dissection.h"
 
 #include <gtest/gtest.h>
 

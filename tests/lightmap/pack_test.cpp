@@ -1,13 +1,13 @@
-#include "lightmap/pack.h"
+#include "lightmap/pack/pack.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "lightmap/pack_shape.h"
-#include "scene/parallel.h"
-#include "scene/stopwatch.h"
+#include "lightmap/pack/pack_shape.h"
+#include "scene/base/parallel.h"
+#include "scene/base/stopwatch.h"
 #include "tests/mentions.h"
 
 namespace lumel {

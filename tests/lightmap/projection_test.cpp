@@ -1,4 +1,4 @@
-#include "lightmap/projection.h"
+#include "lightmap/maps/projection.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "lightmap/rnm_basis.h"
+#include "lightmap/maps/rnm_basis.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
-#include "lightmap/sparse_cholesky.h"
+#include "lightmap/charts/sparse_cholesky.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "scene/parallel.h"
+#include "scene/base/parallel.h"
 
 namespace lumel {
 namespace {

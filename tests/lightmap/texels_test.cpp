@@ -1,4 +1,4 @@
-#include "lightmap/texels.h"
+#include "lightmap/texels/texels.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <map>
 #include <random>
 
-#include "scene/parallel.h"
+#include "scene/base/parallel.h"
 
 namespace lumel {
 namespace {

@@ -1,4 +1,4 @@
-#include "lightmap/uv_rounding.h"
+#include "lightmap/atlas/uv_rounding.h"
 
 #include <gtest/gtest.h>
 

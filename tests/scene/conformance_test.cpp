@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <map>
 
-#include "scene/load_scene.h"
-#include "scene/texture.h"
+#include "scene/images/texture.h"
+#include "scene/load/load_scene.h"
 #include "tests/mentions.h"
 
 namespace lumel {

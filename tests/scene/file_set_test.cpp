@@ -1,4 +1,4 @@
-#include "scene/file_set.h"
+#include "scene/files/file_set.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

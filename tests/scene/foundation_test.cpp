@@ -5,10 +5,10 @@
 #include <fstream>
 #include <iterator>
 
-#include "scene/expected.h"
-#include "scene/image_io.h"
-#include "scene/math.h"
-#include "scene/parallel.h"
+#include "scene/base/expected.h"
+#include "scene/base/math.h"
+#include "scene/base/parallel.h"
+#include "scene/images/image_io.h"
 #include "tests/mentions.h"
 #include "tests/scratch.h"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "scene/gltf_loader.h"
+#include "scene/gltf/gltf_loader.h"
 
 namespace lumel {
 

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <functional>
 
-#include "scene/load_scene.h"
+#include "scene/load/load_scene.h"
 #include "tests/mentions.h"
 #include "tests/scene/gltf_builder.h"
 #include "tests/scratch.h"

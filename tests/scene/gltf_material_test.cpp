@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "scene/texture.h"
+#include "scene/images/texture.h"
 #include "tests/mentions.h"
 #include "tests/scene/gltf_builder.h"
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "scene/file_access.h"
+#include "scene/files/file_access.h"
 #include "tests/scene/gltf_builder.h"
 
 namespace lumel {

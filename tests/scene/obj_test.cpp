@@ -3,11 +3,11 @@
 #include <filesystem>
 #include <fstream>
 
-#include "scene/image_io.h"
-#include "scene/load_scene.h"
-#include "scene/obj_loader.h"
-#include "scene/polygon.h"
-#include "scene/texture.h"
+#include "scene/images/image_io.h"
+#include "scene/images/texture.h"
+#include "scene/load/load_scene.h"
+#include "scene/obj/obj_loader.h"
+#include "scene/triangles/polygon.h"
 #include "tests/mentions.h"
 #include "tests/scratch.h"
 

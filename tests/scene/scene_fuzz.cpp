@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include "scene/check.h"
-#include "scene/gltf_loader.h"
-#include "scene/obj_loader.h"
+#include "scene/base/check.h"
+#include "scene/gltf/gltf_loader.h"
+#include "scene/obj/obj_loader.h"
 
 namespace lumel {
 namespace {

@@ -1,4 +1,4 @@
-#include "scene/sobol.h"
+#include "scene/base/sobol.h"
 
 #include <gtest/gtest.h>
 

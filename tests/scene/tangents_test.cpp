@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "scene/tangents.h"
-#include "scene/triangles.h"
+#include "scene/triangles/tangents.h"
+#include "scene/triangles/triangles.h"
 
 namespace lumel {
 namespace {

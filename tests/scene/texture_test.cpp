@@ -2,10 +2,10 @@
 
 #include <filesystem>
 
-#include "scene/environment.h"
-#include "scene/image_io.h"
-#include "scene/sobol.h"
-#include "scene/texture.h"
+#include "scene/base/sobol.h"
+#include "scene/images/environment.h"
+#include "scene/images/image_io.h"
+#include "scene/images/texture.h"
 #include "tests/mentions.h"
 #include "tests/scratch.h"
 

@@ -1,8 +1,8 @@
 // The two back ends share the height field and nothing else: they must agree within the rays' own error.
 #include <gtest/gtest.h>
 
-#include "ssbump/horizon.h"
-#include "ssbump/ray_occlusion.h"
+#include "ssbump/occlusion/horizon.h"
+#include "ssbump/occlusion/ray_occlusion.h"
 #include "tests/ssbump/fields.h"
 
 namespace lumel::ssbump {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "scene/math.h"
+#include "scene/base/math.h"
 
 namespace lumel::ssbump::closed_forms {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "ssbump/height_field.h"
+#include "ssbump/occlusion/height_field.h"
 
 namespace lumel::ssbump::fields {
 

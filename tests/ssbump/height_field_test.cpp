@@ -1,12 +1,12 @@
-#include "ssbump/height_field.h"
+#include "ssbump/occlusion/height_field.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 
 #include "ssbump/basis_file.h"
-#include "ssbump/bilateral.h"
-#include "ssbump/weights.h"
+#include "ssbump/maps/weights.h"
+#include "ssbump/occlusion/bilateral.h"
 #include "tests/mentions.h"
 #include "tests/scratch.h"
 #include "tests/ssbump/fields.h"

@@ -1,12 +1,12 @@
 // Horizons against closed forms, wrapping, edges, and the promise of the same bits.
-#include "ssbump/horizon.h"
+#include "ssbump/occlusion/horizon.h"
 
 #include <gtest/gtest.h>
 
 #include <array>
 
-#include "lightmap/rnm_basis.h"
-#include "scene/parallel.h"
+#include "lightmap/maps/rnm_basis.h"
+#include "scene/base/parallel.h"
 #include "tests/ssbump/closed_forms.h"
 #include "tests/ssbump/fields.h"
 

@@ -1,8 +1,8 @@
-#include "ssbump/lobe.h"
+#include "ssbump/occlusion/lobe.h"
 
 #include <gtest/gtest.h>
 
-#include "lightmap/rnm_basis.h"
+#include "lightmap/maps/rnm_basis.h"
 
 namespace lumel::ssbump {
 namespace {

@@ -4,11 +4,11 @@
 #include <filesystem>
 #include <fstream>
 
-#include "scene/image_io.h"
+#include "scene/images/image_io.h"
 #include "ssbump/bake.h"
 #include "ssbump/contact_sheet.h"
-#include "ssbump/convert.h"
-#include "ssbump/mip.h"
+#include "ssbump/maps/convert.h"
+#include "ssbump/maps/mip.h"
 #include "ssbump/study.h"
 #include "tests/scratch.h"
 #include "tests/ssbump/fields.h"

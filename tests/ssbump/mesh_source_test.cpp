@@ -1,11 +1,11 @@
-#include "ssbump/mesh_source.h"
+#include "ssbump/mesh/mesh_source.h"
 
 #include <gtest/gtest.h>
 
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "lightmap/rnm_basis.h"
-#include "ssbump/low_poly.h"
+#include "lightmap/maps/rnm_basis.h"
+#include "ssbump/mesh/low_poly.h"
 #include "tests/mentions.h"
 #include "tests/ssbump/closed_forms.h"
 #include "tests/ssbump/fields.h"

@@ -1,4 +1,4 @@
-#include "ssbump/samples.h"
+#include "ssbump/occlusion/samples.h"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
-#include "ssbump/weights.h"
+#include "ssbump/maps/weights.h"
 
 #include <gtest/gtest.h>
 
-#include "lightmap/rnm_basis.h"
+#include "lightmap/maps/rnm_basis.h"
 #include "tests/ssbump/fields.h"
 
 namespace lumel::ssbump {

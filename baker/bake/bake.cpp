@@ -1,0 +1,327 @@
+#include "baker/bake/bake.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <limits>
+#include <optional>
+#include <span>
+
+#include "baker/gather/doubling_error.h"
+#include "baker/gather/gather_integrator.h"
+#include "baker/path/path_integrator.h"
+#include "baker/rays/flush_denormals.h"
+#include "scene/base/parallel.h"
+#include "scene/base/stopwatch.h"
+
+namespace lumel {
+namespace {
+
+constexpr std::size_t kMostNotes = 10;
+
+/// Bounces of the path integrator where all that matter are asked for; Russian roulette ends paths well before.
+constexpr int kLongestPath = 64;
+
+/// Samples where nothing shines: only validity is left to find out.
+constexpr int kSamplesInTheDark = 8;
+
+/// Up to kLanes consecutive texels of a page.
+struct Wave {
+  std::uint32_t page = 0;
+  std::size_t first = 0;
+  std::size_t count = 0;
+};
+
+std::vector<Wave> wavesOf(const std::vector<PageTexels>& texels) {
+  std::vector<Wave> waves;
+  for (std::size_t p = 0; p < texels.size(); ++p)
+    for (std::size_t first = 0; first < texels[p].size(); first += kLanes)
+      waves.push_back({static_cast<std::uint32_t>(p), first, std::min<std::size_t>(kLanes, texels[p].size() - first)});
+  return waves;
+}
+
+/// What a wave leaves beside its texels' pixels; summed in the order of waves.
+struct WaveStats {
+  std::uint64_t rays = 0;
+  std::uint64_t shadowRays = 0;
+  std::size_t nonFinite = 0;
+  std::vector<NonFiniteSample> firstNonFinite;
+  std::uint32_t mostSamples = 0;
+  double luminance = 0.0;
+  double standardError = 0.0;
+  std::size_t validTexels = 0;
+  double residualSquares = 0.0;
+  std::size_t residuals = 0;
+};
+
+/// Enters a texel's aux pixel and figures; `rnm` as stored.
+void storeAux(Image& aux, TexelCoord at, const BakedTexel& texel, const Vec3& flat, const std::array<Vec3, 3>& rnm,
+              WaveStats& stats) {
+  float* pixel = aux.at(at.x, at.y);
+  pixel[0] = texel.coverage;
+  pixel[1] = texel.validity;
+  pixel[2] = texel.standardError;
+  pixel[3] = static_cast<float>(texel.samples);
+  stats.mostSamples = std::max(stats.mostSamples, texel.samples);
+  if (texel.validity < 0.5f) return;
+  ++stats.validTexels;
+  stats.luminance += static_cast<double>(luminance(flat));
+  stats.standardError += static_cast<double>(texel.standardError);
+  if (!texel.probed) return;
+  for (std::size_t i = 0; i < kProbeNormals; ++i) {
+    const auto difference =
+        static_cast<double>(luminance(decodeRnm(rnm, probeNormals()[i])) - luminance(texel.probes[i]));
+    stats.residualSquares += difference * difference;
+    ++stats.residuals;
+  }
+}
+
+/// Of path tracing.
+void storeTexel(BakedPage& page, TexelCoord at, const TexelResult& texel, Projection projection, WaveStats& stats) {
+  if (!(texel.coverage > 0.0f)) return;
+  BakedTexel baked{.coverage = texel.coverage,
+                   .validity = texel.sums.validity(),
+                   .samples = texel.sums.count(),
+                   .probed = texel.probed && texel.sums.count() > 0};
+  if (baked.probed)
+    for (std::size_t i = 0; i < kProbeNormals; ++i)
+      baked.probes[i] = Vec3(texel.probes[i] / static_cast<double>(baked.samples));
+  const SampleValue value = texel.sums.mean();
+  const std::array<Vec3, 3> rnm = finishTexel(projection, value.rnm, value.flat);
+  for (std::size_t i = 0; i < 3; ++i) page.rnm[i].setRgb(at.x, at.y, rnm[i]);
+  page.flat.setRgb(at.x, at.y, value.flat);
+  storeAux(page.aux, at, baked, value.flat, rnm, stats);
+}
+
+/// Fewest samples of which an error is known.
+std::uint32_t fewestForError(Integrator integrator) {
+  return integrator == Integrator::Gather ? 2 * GatherIntegrator::kFirstPass : 2;
+}
+
+BakeStats sumUp(std::span<const WaveStats> waves, const BakeOptions& options) {
+  BakeStats total;
+  double luminanceSum = 0.0;
+  double errorSum = 0.0;
+  double residualSquares = 0.0;
+  std::size_t valid = 0;
+  std::uint32_t mostSamples = 0;
+  std::size_t residuals = 0;
+  std::vector<std::string> notes;
+  for (const WaveStats& wave : waves) {
+    total.rays += wave.rays;
+    total.shadowRays += wave.shadowRays;
+    total.nonFiniteSamples += wave.nonFinite;
+    luminanceSum += wave.luminance;
+    errorSum += wave.standardError;
+    valid += wave.validTexels;
+    mostSamples = std::max(mostSamples, wave.mostSamples);
+    residualSquares += wave.residualSquares;
+    residuals += wave.residuals;
+    for (const NonFiniteSample& s : wave.firstNonFinite)
+      if (notes.size() < kMostNotes)
+        notes.push_back("non-finite sample left out: page " + std::to_string(s.page) + ", texel (" +
+                        std::to_string(s.texel.x) + ", " + std::to_string(s.texel.y) + "), sample " +
+                        std::to_string(s.sample) + ", seed " + std::to_string(options.seed));
+  }
+  total.notes = std::move(notes);
+  if (valid > 0) {
+    total.meanFlat = luminanceSum / static_cast<double>(valid);
+    if (mostSamples >= fewestForError(options.integrator))
+      total.meanStandardError = errorSum / static_cast<double>(valid);
+  }
+  if (residuals > 0 && total.meanFlat > 0)
+    total.projectionResidual = std::sqrt(residualSquares / static_cast<double>(residuals)) / total.meanFlat;
+  return total;
+}
+
+Image pageImage(const Atlas& atlas, std::size_t page, int channels) {
+  return Image(atlas.pages[page].width, atlas.pages[page].height, channels);
+}
+
+constexpr std::size_t kTexelGrain = 1024;
+
+/// Finishes the light of a page's texels [first, last) and stores all but the maps.
+void finishTexels(const GatherIntegrator& integrator, std::uint32_t page, const PageTexels& texels, std::size_t first,
+                  std::size_t last, Projection projection, TexelLight& light, Image& aux, WaveStats& stats) {
+  for (std::size_t i = first; i < last; ++i) {
+    const BakedTexel texel = integrator.texel(page, i);
+    if (!(texel.coverage > 0.0f)) continue;
+    const std::size_t t = integrator.firstOfPage(page) + i;
+    std::array<Vec3, 3> rnm = {light.rnm[0][t], light.rnm[1][t], light.rnm[2][t]};
+    rnm = finishTexel(projection, rnm, light.flat[t]);
+    for (std::size_t k = 0; k < 3; ++k) light.rnm[k][t] = rnm[k];
+    storeAux(aux, texels.coords[i], texel, light.flat[t], rnm, stats);
+  }
+}
+
+/// The pages' images of one map; its texels are freed.
+std::vector<Image> takeMap(std::vector<Vec3>& map, const Atlas& atlas, const std::vector<PageTexels>& texels) {
+  std::vector<Image> images;
+  std::size_t before = 0;
+  for (std::size_t p = 0; p < texels.size(); ++p) {
+    Image& image = images.emplace_back(pageImage(atlas, p, 3));
+    const std::vector<TexelCoord>& coords = texels[p].coords;
+    parallelFor(coords.size(), kTexelGrain, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) image.setRgb(coords[i].x, coords[i].y, map[before + i]);
+    });
+    before += coords.size();
+  }
+  map = std::vector<Vec3>();
+  return images;
+}
+
+Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
+                                        const std::vector<PageTexels>& texels, const BakeOptions& options,
+                                        std::vector<BakedPage>& pages, Progress& progress) {
+  const GatherOptions gatherOptions{.samples = std::max(1, options.samples),
+                                    .maxSamples = options.maxSamples,
+                                    .bounces = options.bounces,
+                                    .indirectOnly = options.indirectOnly,
+                                    .seed = options.seed,
+                                    .targetError = options.targetError,
+                                    .adaptive = options.adaptive,
+                                    .timeBudgetSeconds = static_cast<double>(options.timeBudgetSeconds)};
+  std::optional<GatherIntegrator> integrator(std::in_place, transport, kernels, atlas, texels, gatherOptions);
+  if (auto done = integrator->run(progress); !done) return done.error();
+  // Texels become pages map by map: the two together would be the peak of a bake's memory.
+  TexelLight light = integrator->takeLight();
+  pages.resize(atlas.pages.size());
+  std::vector<WaveStats> stats(1);
+  stats[0].rays = integrator->rays();
+  stats[0].shadowRays = integrator->shadowRays();
+  stats[0].nonFinite = integrator->nonFinite().size();
+  stats[0].firstNonFinite = integrator->nonFinite();
+  for (std::size_t p = 0; p < pages.size(); ++p) {
+    pages[p].aux = pageImage(atlas, p, 4);
+    const std::size_t before = stats.size();
+    stats.resize(before + (texels[p].size() + kTexelGrain - 1) / kTexelGrain);
+    parallelFor(texels[p].size(), kTexelGrain, [&](std::size_t first, std::size_t last) {
+      finishTexels(*integrator, static_cast<std::uint32_t>(p), texels[p], first, last, options.projection, light,
+                   pages[p].aux, stats[before + first / kTexelGrain]);
+    });
+  }
+  integrator.reset();
+  const auto take = [&](std::vector<Vec3>& map, auto imageOf) {
+    std::vector<Image> images = takeMap(map, atlas, texels);
+    for (std::size_t p = 0; p < pages.size(); ++p) imageOf(pages[p]) = std::move(images[p]);
+  };
+  for (std::size_t k = 0; k < 3; ++k) take(light.rnm[k], [k](BakedPage& page) -> Image& { return page.rnm[k]; });
+  take(light.flat, [](BakedPage& page) -> Image& { return page.flat; });
+  return stats;
+}
+
+/// Long paths gain little from their sequence, and tails are heavy: no credit is taken.
+constexpr double kPathCredit = 0.0;
+/// Batches after which the mean of a path-traced texel is kept: each has twice the samples of the one before.
+constexpr std::array<int, 5> kMarks = {1, 2, 4, 8, TexelSums::kBatches};
+using WaveMeans = std::array<std::array<float, kLanes>, kMarks.size()>;
+
+/// The standard errors of path-traced texels, as if their samples had been taken by doubling.
+void storePathErrors(const std::vector<Wave>& waves, const std::vector<WaveMeans>& means, int samples,
+                     const std::vector<PageTexels>& texels, std::vector<BakedPage>& pages,
+                     std::vector<WaveStats>& stats) {
+  DoublingError errors(texels, kPathCredit);
+  const std::vector<std::uint8_t> live(waves.size(), 1);
+  for (std::size_t m = 0; m < kMarks.size(); ++m) {
+    const auto samplesAt = [samples](int mark) {
+      return static_cast<std::uint32_t>((std::int64_t{samples} * mark + TexelSums::kBatches - 1) / TexelSums::kBatches);
+    };
+    const std::uint32_t before = m == 0 ? 0 : samplesAt(kMarks[m - 1]);
+    const std::uint32_t now = samplesAt(kMarks[m]);
+    if (now == before) continue;
+    for (std::size_t w = 0; w < waves.size(); ++w)
+      errors.add(w, means[w][m == 0 ? 0 : m - 1], means[w][m], before, now - before);
+    errors.endPass(live);
+  }
+  for (std::size_t w = 0; w < waves.size(); ++w)
+    for (std::size_t i = 0; i < waves[w].count; ++i) {
+      const TexelCoord at = texels[waves[w].page].coords[waves[w].first + i];
+      float* aux = pages[waves[w].page].aux.at(at.x, at.y);
+      if (!(aux[0] > 0.0f)) continue;
+      aux[2] = errors.standardError(w, i);
+      if (aux[1] >= 0.5f) stats[w].standardError += static_cast<double>(aux[2]);
+    }
+}
+
+Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, const RnmKernels& kernels,
+                                            const Atlas& atlas, const std::vector<PageTexels>& texels,
+                                            const BakeOptions& options, std::vector<BakedPage>& pages,
+                                            Progress& progress) {
+  const PathIntegrator integrator(transport, kernels, atlas,
+                                  {.samples = std::max(1, options.samples),
+                                   .bounces = options.bounces < 0 ? kLongestPath : options.bounces,
+                                   .indirectOnly = options.indirectOnly,
+                                   .seed = options.seed});
+  pages.resize(atlas.pages.size());
+  for (std::size_t p = 0; p < pages.size(); ++p) {
+    for (Image* image : {&pages[p].rnm[0], &pages[p].rnm[1], &pages[p].rnm[2], &pages[p].flat})
+      *image = pageImage(atlas, p, 3);
+    pages[p].aux = pageImage(atlas, p, 4);
+  }
+  const std::vector<Wave> waves = wavesOf(texels);
+  std::vector<WaveStats> waveStats(waves.size());
+  std::uint64_t texelCount = 0;
+  for (const PageTexels& page : texels) texelCount += page.size();
+  std::vector<WaveMeans> means(waves.size());
+  progress.begin("bake", texelCount);
+  parallelFor(waves.size(), 1, [&](std::size_t first, std::size_t last) {
+    const FlushDenormals flush;
+    for (std::size_t w = first; w < last; ++w) {
+      if (progress.cancelled()) return;
+      const Wave& wave = waves[w];
+      const PageTexels& page = texels[wave.page];
+      WaveResult done = integrator.bakeWave(wave.page, page, wave.first, wave.count);
+      WaveStats& stats = waveStats[w];
+      stats.rays = done.rays;
+      stats.shadowRays = done.shadowRays;
+      stats.nonFinite = done.nonFinite.size();
+      done.nonFinite.resize(std::min(done.nonFinite.size(), kMostNotes));
+      stats.firstNonFinite = std::move(done.nonFinite);
+      for (std::size_t m = 0; m < kMarks.size(); ++m)
+        for (std::size_t i = 0; i < wave.count; ++i) means[w][m][i] = done.texels[i].sums.luminanceBefore(kMarks[m]);
+      for (std::size_t i = 0; i < wave.count; ++i)
+        storeTexel(pages[wave.page], page.coords[wave.first + i], done.texels[i], options.projection, stats);
+      progress.advance(wave.count);
+    }
+  });
+  progress.end();
+  if (progress.cancelled()) return interrupted();
+  storePathErrors(waves, means, std::max(1, options.samples), texels, pages, waveStats);
+  return waveStats;
+}
+
+}  // namespace
+
+Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                          const BakeOptions& askedFor, Progress& progress) {
+  const Stopwatch sinceStart;
+  std::vector<std::string> notes;
+  const Materials materials(scene, askedFor.bounces != 0, notes);
+  auto rays = RayScene::build(scene, materials);
+  if (!rays) return rays.error();
+  const PunctualLights punctual(scene.lights);
+  const EmissiveTriangles emissive(**rays, materials);
+  const EnvironmentLight environment(scene.environment);
+  const LightTransport transport{**rays, materials, punctual, emissive, environment};
+  const RnmKernels kernels(askedFor.projection);
+  BakeOptions options = askedFor;
+  if (transport.dark()) {
+    options.samples = std::min(options.samples, kSamplesInTheDark);
+    options.bounces = 0;
+    options.targetError = 0.0f;
+  }
+
+  BakeResult result;
+  const auto waveStats = options.integrator == Integrator::Gather
+                             ? gather(transport, kernels, atlas, texels, options, result.pages, progress)
+                             : tracePaths(transport, kernels, atlas, texels, options, result.pages, progress);
+  if (!waveStats) return waveStats.error();
+
+  result.stats = sumUp(*waveStats, options);
+  for (const PageTexels& page : texels) result.stats.texels += page.size();
+  result.stats.notes.insert(result.stats.notes.begin(), notes.begin(), notes.end());
+  result.stats.seconds = sinceStart.seconds();
+  return result;
+}
+
+}  // namespace lumel

@@ -1,0 +1,54 @@
+// The main job: irradiance at every texel of an atlas, projected onto the RNM basis.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "baker/bake/bake_options.h"
+#include "lightmap/surface.h"
+#include "lightmap/texels/texels.h"
+#include "scene/base/expected.h"
+#include "scene/base/progress.h"
+#include "scene/image.h"
+#include "scene/scene.h"
+
+namespace lumel {
+
+/// One atlas page. All images have the page's size; texels without coverage are 0 everywhere.
+struct BakedPage {
+  std::array<Image, 3> rnm;  // RGB
+  Image flat;                // RGB: irradiance / pi
+  // Channels of aux, in order: coverage (area share 0..1), validity (share of gather rays that met no back of a
+  // single-sided surface), stderr (standard error of the flat map's luminance), samples (those taken of this texel:
+  // fewer where its error has settled, or where it is inside of something).
+  Image aux;
+};
+
+/// Cost and error figures of a bake, written to bake.json.
+struct BakeStats {
+  std::uint64_t texels = 0;
+  std::uint64_t rays = 0;        // closest-hit
+  std::uint64_t shadowRays = 0;  // occlusion
+  double seconds = 0.0;
+  std::size_t nonFiniteSamples = 0;         // counted and left out of the sums, named in `notes`; never silently zeroed
+  double meanFlat = 0.0;                    // mean luminance over covered, valid texels
+  std::optional<double> meanStandardError;  // mean of aux stderr over the same; none of too few samples
+  double projectionResidual = 0.0;  // RMS difference between decoded and true irradiance / pi over sample normals
+                                    // within 30 degrees, relative to meanFlat
+  std::vector<std::string> notes;
+};
+
+struct BakeResult {
+  std::vector<BakedPage> pages;
+  BakeStats stats;
+};
+
+/// Finds the light at every covered texel. The result depends on scene, atlas and options alone, bit for bit, never on
+/// the number of threads. Errors: Failed (Embree, memory), Interrupted.
+Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                          const BakeOptions& options, Progress& progress);
+
+}  // namespace lumel

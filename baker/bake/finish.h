@@ -1,0 +1,27 @@
+// The last steps before a bake is written: noise is taken out, texels that have no light of their own get their
+// neighbours'.
+#pragma once
+
+#include <vector>
+
+#include "baker/bake/bake.h"
+#include "lightmap/surface.h"
+#include "lightmap/texels/texels.h"
+
+namespace lumel {
+
+struct FinishOptions {
+  bool denoise = false;
+  int rings = 0;  // of texels that maps grow by, beyond what is covered
+};
+
+/// First noise is taken out of the maps, if asked for (lightmap/denoise.h); invalid texels take no part.
+/// A covered texel whose rays mostly met the backs of surfaces (validity under one half: it lies inside a wall, under
+/// a pillar) takes the light of the nearest valid texels of its chart, where the chart has any; it would leak darkness
+/// into bilinear lookups beside it. Then every map grows by `rings`, so that a lookup at a chart's border does not mix
+/// in black. The aux images stay as they are: they still tell own values from others, and give the error before
+/// denoising.
+void finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                 const FinishOptions& options);
+
+}  // namespace lumel

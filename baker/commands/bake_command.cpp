@@ -1,0 +1,275 @@
+// lumel bake: from a scene file to the files of a bake.
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <memory>
+
+#include "baker/bake/bake.h"
+#include "baker/bake/finish.h"
+#include "baker/bake/quality.h"
+#include "baker/commands/command.h"
+#include "baker/commands/scene_arguments.h"
+#include "baker/commands/stage_clock.h"
+#include "baker/files/names/conventions.h"
+#include "baker/files/names/file_names.h"
+#include "baker/files/read/earlier_layout.h"
+#include "baker/files/write/bake_files.h"
+#include "lightmap/atlas/atlas.h"
+#include "lightmap/texels/texels.h"
+#include "scene/base/parallel.h"
+#include "scene/base/process_memory.h"
+#include "scene/files/file_set.h"
+
+namespace lumel {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kDilateByPadding = -1;
+
+/// Auto: for the gather. Path tracing is the reference and stays as it is.
+enum class Denoise { Auto, On, Off };
+/// Least samples where a target error is given and --samples is not: the first at which an error is known well enough.
+constexpr int kLeastSamples = 32;
+
+struct BakeArguments : SceneArguments {
+  fs::path output;
+  AtlasOptions atlas;
+  fs::path layoutFrom;
+  BakeOptions bake;
+  Denoise denoise = Denoise::Auto;
+  int dilate = kDilateByPadding;
+  bool half = false;
+  int threads = 0;
+  Quality quality = Quality::Production;
+  int samples = 0;  // 0: as the quality has it
+};
+
+void declareLightOptions(OptionTable& options, BakeArguments& a) {
+  options.group("Light");
+  options.choice("integrator", a.bake.integrator, {"gather", "path"},
+                 "Light from other texels (gather), or every path to its end: unbiased and slow (path)");
+  options.choice("quality", a.quality, {"draft", "preview", "production"}, "16, 64 or 256 samples");
+  options.integer("samples", a.samples, {1, 1 << 24}, "Gather rays per texel, at most; with --target-error the least")
+      .defaultText = "by --quality; 32 with --target-error";
+  options.choice("adaptive", a.bake.adaptive, {"off", "on"},
+                 "After 32 samples leave out texels whose error is too small to be seen beside that of others; off: "
+                 "the same number everywhere");
+  options.share("target-error", a.bake.targetError, {0.0f, 0.5f},
+                "Sample each part of a page until the relative standard error of its light is so small (1% or 0.01); "
+                "done when 95% of the texels are. Texels darker than a tenth of the mean count as so bright. 0: off, "
+                "the same number of rays everywhere");
+  options.integer("max-samples", a.bake.maxSamples, {1, 1 << 24},
+                  "Most gather rays per texel with --target-error, whether it is met or not");
+  options.number("time-budget", a.bake.timeBudgetSeconds, {0.0f},
+                 "Begin no pass that would end later than so many seconds of gathering; 0: none. The result then "
+                 "depends on the machine");
+  options.integerOrWord("bounces", a.bake.bounces, {0, 1024}, "all", kAllBounces,
+                        "Indirect bounces; 0: direct light only, all: as many as matter");
+  options.flag("indirect-only", a.bake.indirectOnly,
+               "Leave out light that comes straight from lights, shining surfaces and the sky: the program that shows "
+               "the scene adds it");
+  declareSkyAndSides(options, a);
+  options.choice("projection", a.bake.projection, {"raw", "flat", "fit"},
+                 "How light is spread over the three maps: as in the literature (raw), scaled so that a flat normal is "
+                 "exact (flat), least squares (fit)");
+  options.integer("seed", a.bake.seed, "Seed of the sampling; the same seed gives the same bytes");
+}
+
+void declareOptions(OptionTable& options, BakeArguments& a) {
+  declareScene(options, a);
+  options.group("Files");
+  Option& output =
+      options.path("output", a.output, "Folder for the result; an older result is replaced when the new one is whole");
+  output.shortName = "o";
+  output.placeholder = "DIR";
+  output.required = true;
+  options.flag("half", a.half, "Write half floats: half the size, values up to 65504");
+  options.choice("denoise", a.denoise, {"auto", "on", "off"},
+                 "Average texels with those around them that agree within their noise; auto: with --integrator gather");
+  options.integer("dilate", a.dilate, {0, 1024}, "Rings of texels grown around charts; 0: none").defaultText =
+      "half of --padding";
+  declareOutsidePaths(options, a);
+  declareAtlasOptions(options, a.atlas);
+  options
+      .path("layout-from", a.layoutFrom,
+            "Folder of an earlier bake, may be the output's: unchanged charts stay where they are in it [none]")
+      .placeholder = "DIR";
+  declareLightOptions(options, a);
+  options.group("General");
+  options.integer("threads", a.threads, {0, 1024}, "Threads to use, without influence on the result; 0: one per core");
+}
+
+/// What the options cannot check one by one.
+Expected<void> check(const BakeArguments& a, const OptionTable& options) {
+  if (auto checked = checkAtlas(a.atlas); !checked) return checked;
+  if (a.bake.integrator == Integrator::Path && (a.bake.targetError > 0.0f || a.bake.timeBudgetSeconds > 0.0f))
+    return usageError("--target-error and --time-budget work with --integrator gather alone; give --samples");
+  if (options.isGiven("max-samples") && !(a.bake.targetError > 0.0f))
+    return usageError("--max-samples goes with --target-error; without one --samples is the number");
+  if (a.bake.indirectOnly && a.bake.bounces == 0)
+    return usageError("--indirect-only and --bounces 0 leave no light; give one of them");
+  if (a.bake.targetError > 0.0f && a.samples > a.bake.maxSamples)
+    return usageError("--samples " + std::to_string(a.samples) + " is more than --max-samples " +
+                      std::to_string(a.bake.maxSamples));
+  return checkSky(a);
+}
+
+void printSettings(const nlohmann::ordered_json& settings) {
+  std::string line = "settings";
+  for (const auto& [key, value] : settings.items()) {
+    if (value.is_null()) continue;
+    line += " " + key + "=" + (value.is_string() ? value.get<std::string>() : value.dump());
+  }
+  std::fprintf(stderr, "%s\n", line.c_str());
+}
+
+void printSummary(const fs::path& output, const AtlasResult& atlas, const BakeResult& result,
+                  const BakeRecord& record) {
+  double texels = 0.0;
+  for (const Page& page : atlas.atlas.pages)
+    texels += static_cast<double>(page.width) * static_cast<double>(page.height);
+  double seconds = 0.0;
+  for (const StageTime& stage : record.stages) seconds += stage.seconds;
+  const BakeStats& stats = result.stats;
+  const double rays = static_cast<double>(stats.rays + stats.shadowRays);
+  std::fprintf(stderr, "%s: %zu page%s, %.1f%% covered, %zu chart%s, %llu texels", output.c_str(),
+               atlas.atlas.pages.size(), atlas.atlas.pages.size() == 1 ? "" : "s",
+               texels > 0 ? 100.0 * static_cast<double>(stats.texels) / texels : 0.0, atlas.atlas.charts.size(),
+               atlas.atlas.charts.size() == 1 ? "" : "s", static_cast<unsigned long long>(stats.texels));
+  if (atlas.atlas.texelsPerMeter > 0.0f)
+    std::fprintf(stderr, " at %.4g per metre", static_cast<double>(atlas.atlas.texelsPerMeter));
+  std::fprintf(stderr, "\nmean light %.4g, ", stats.meanFlat);
+  if (stats.meanFlat > 0.0 && stats.meanStandardError)
+    std::fprintf(stderr, "standard error %.2g%%", 100.0 * *stats.meanStandardError / stats.meanFlat);
+  else
+    std::fputs("standard error not known", stderr);
+  std::fprintf(stderr, ", projection residual %.2g%%\n", 100.0 * stats.projectionResidual);
+  std::fprintf(stderr, "%.1f s, %.1f million rays (%.1f million per second of bake), %.0f MiB at the peak\n", seconds,
+               rays / 1e6, stats.seconds > 0 ? rays / 1e6 / stats.seconds : 0.0,
+               static_cast<double>(record.peakMemoryBytes) / (1024.0 * 1024.0));
+}
+
+int samplesOf(const BakeArguments& a) {
+  if (a.samples > 0) return a.samples;
+  return a.bake.targetError > 0.0f ? std::min(kLeastSamples, a.bake.maxSamples) : samplesOf(a.quality);
+}
+
+bool denoises(const BakeArguments& a) {
+  if (a.denoise != Denoise::Auto) return a.denoise == Denoise::On;
+  return a.bake.integrator == Integrator::Gather;
+}
+
+BakeRecord recordOf(const BakeArguments& a, int dilate, nlohmann::ordered_json settings) {
+  settings["dilate"] = dilate;
+  // What cannot change the result is kept out of the settings, so that equal bakes have equal settings.
+  for (const char* key : {"output", "threads"}) settings.erase(key);
+  BakeRecord record;
+  record.sceneFile = a.scene;
+  record.atlasOptions = a.atlas;
+  record.bakeOptions = a.bake;
+  record.bakeOptions.samples = samplesOf(a);
+  record.dilate = dilate;
+  record.half = a.half;
+  record.threads = availableThreads();
+  record.settings = std::move(settings);
+  return record;
+}
+
+Expected<AtlasResult> makeAtlas(const Scene& scene, const BakeArguments& a, CommandContext& context) {
+  AtlasOptions options = a.atlas;
+  if (!a.layoutFrom.empty()) {
+    auto layout = readEarlierLayout(a.layoutFrom);
+    if (!layout) return layout.error();
+    options.layout = std::move(*layout);
+  }
+  auto atlas = buildAtlas(scene, options, context.progress);
+  if (!atlas || context.quiet) return atlas;
+  printWarnings(atlas->report.warnings);
+  if (options.layout)
+    std::fprintf(stderr, "%zu of %zu charts (%.1f%% of their surface) stay where they were\n", atlas->report.keptCharts,
+                 atlas->report.generatedCharts, 100.0 * atlas->report.keptShare);
+  return atlas;
+}
+
+Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
+  if (auto checked = check(a, context.options); !checked) return checked;
+  for (const fs::path& input : {a.scene, a.sky})
+    if (isBakeFile(input.filename().string()))
+      if (auto apart = checkNoInput(a.output / input.filename(), std::array{input}); !apart) return apart;
+  FileSet::recover(a.output);
+  if (auto writable = checkWritable(a.output); !writable) return writable;
+  keepLargeArraysApart();
+  const ThreadLimit limit(a.threads);
+  const int samples = samplesOf(a);
+  context.settings["samples"] = samples;
+  context.settings["denoise"] = denoises(a) ? "on" : "off";
+  const int dilate = a.dilate == kDilateByPadding ? (a.atlas.padding + 1) / 2 : a.dilate;
+  BakeRecord record = recordOf(a, dilate, context.settings);
+
+  StageClock clock(context.quiet);
+  Progress& progress = context.progress;
+  clock.start("load");
+  const auto scene = loadLitScene(a, context.progress);
+  if (!scene) return scene.error();
+  if (!context.quiet) printSettings(record.settings);
+  if (!context.quiet) printWarnings(scene->report.warnings);
+  if (progress.cancelled()) return interrupted();
+
+  clock.start("atlas");
+  const auto atlas = makeAtlas(*scene, a, context);
+  if (!atlas) return atlas.error();
+  if (!context.quiet && atlas->atlas.charts.empty())
+    std::fprintf(
+        stderr,
+        "lumel: warning: no triangle of the scene gets a lightmap (%zu without area, %zu primitives of points or "
+        "lines are left out)\n",
+        scene->report.degenerateTriangles, scene->report.skippedPrimitives);
+  returnFreeMemory();
+  clock.start("texels");
+  const auto texels = findTexels(atlas->atlas);
+  returnFreeMemory();
+  clock.start("bake");
+  auto baked = bake(*scene, atlas->atlas, texels, record.bakeOptions, progress);
+  if (!baked) return baked.error();
+  clock.start("finish");
+  finishPages(baked->pages, atlas->atlas, texels, {.denoise = denoises(a), .rings = dilate});
+  clock.stop();
+  if (progress.cancelled()) return interrupted();
+
+  record.stages = clock.stages();
+  record.peakMemoryBytes = peakMemoryBytes();
+  clock.start("write");
+  if (auto written = writeBake(a.output, *scene, *atlas, *baked, record); !written) return written;
+  clock.stop();
+  if (context.quiet) return {};
+  record.stages = clock.stages();
+  record.peakMemoryBytes = peakMemoryBytes();
+  printSummary(a.output, *atlas, *baked, record);
+  return {};
+}
+
+}  // namespace
+
+Command bakeCommand() {
+  Command command;
+  const auto arguments = std::make_shared<BakeArguments>();
+  command.name = "bake";
+  command.summary = "Bake a scene into lightmaps: three RNM maps and a flat one per atlas page";
+  command.takesConfig = true;
+  command.examples =
+      "Examples:\n"
+      "  lumel bake level.gltf -o out/level\n"
+      "      lights and emissive surfaces of the file, one page of 1024 x 1024\n"
+      "  lumel bake level.glb -o out/level --sky noon.hdr --sky-rotation 90 --texels-per-meter 16\n"
+      "      light from a sky image, as many pages as 16 texels per metre need\n"
+      "  lumel bake level.obj -o out/level --sky-color 0.4 0.6 1 --samples 64 --bounces 2\n"
+      "      a quick preview under an even blue sky\n"
+      "  lumel bake --config level.toml\n"
+      "      everything from a file: scene = \"level.gltf\", output = \"out/level\", samples = 1024";
+  declareOptions(command.options, *arguments);
+  command.run = [arguments](CommandContext& context) { return runBake(*arguments, context); };
+  return command;
+}
+
+}  // namespace lumel

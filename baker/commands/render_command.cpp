@@ -1,0 +1,208 @@
+// lumel render: a still of a bake.
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdio>
+#include <memory>
+
+#include "baker/commands/command.h"
+#include "baker/files/names/file_names.h"
+#include "baker/files/names/version.h"
+#include "baker/stills/compositor.h"
+#include "baker/stills/tone_map.h"
+#include "baker/stills/viewpoint.h"
+#include "scene/base/parallel.h"
+#include "scene/files/file_access.h"
+#include "scene/files/file_set.h"
+#include "scene/images/image_io.h"
+
+namespace lumel {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kDefaultWidth = 1280;
+constexpr int kDefaultHeight = 720;
+
+struct RenderArguments {
+  fs::path bake;
+  fs::path output;
+  std::string camera;
+  std::optional<Vec3> position;
+  std::optional<Vec3> lookAt;
+  float fovDegrees = 0.0f;
+  int width = 0;
+  int height = 0;
+  int samplesPerPixel = 16;
+  RenderMode mode = RenderMode::Lit;
+  std::optional<float> exposure;
+  ToneMap toneMap = ToneMap::Aces;
+  int threads = 0;
+};
+
+void declareOptions(OptionTable& options, RenderArguments& a) {
+  options.positionalPath("bake", a.bake, "Folder that lumel bake -o wrote").placeholder = "DIR";
+  options.group("Picture");
+  Option& output = options.path("output", a.output, "Picture to write: .png (tone-mapped) or .exr (linear, unexposed)");
+  output.shortName = "o";
+  output.required = true;
+  options.integer("width", a.width, {0, 16384}, "Pixels").defaultText = std::to_string(kDefaultWidth);
+  options.integer("height", a.height, {0, 16384}, "Pixels").defaultText = "by the camera's aspect, else 16:9";
+  options.integer("spp", a.samplesPerPixel, {1, 4096}, "Rays per pixel, for smooth edges");
+  options.choice("mode", a.mode, {"lit", "lightmap", "albedo", "normal"},
+                 "What to show: the lit scene, the light alone, the albedo, or world-space normals");
+  options
+      .optionalNumber("exposure", a.exposure, {-64.0f, 64.0f}, "Stops of exposure for PNG; 0 shows radiance 1 as white")
+      .defaultText = "by the picture's brightness";
+  options.choice("tonemap", a.toneMap, {"aces", "linear"}, "Curve for PNG");
+  options.group("Camera");
+  options.text("camera", a.camera, "Name or number (from 0) of a camera of the scene, or auto").defaultText =
+      "the scene's first, else auto";
+  options.find("camera")->placeholder = "NAME|N|auto";
+  options.vector("camera-position", a.position, "Position of a camera of your own, in the scene's metres");
+  options.vector("look-at", a.lookAt, "Where it looks [middle of the scene]");
+  options.number("fov", a.fovDegrees, {0.0f, 170.0f}, "Vertical field of view in degrees; 0: the camera's")
+      .placeholder = "DEGREES";
+  options.group("General");
+  options.integer("threads", a.threads, {0, 1024}, "Threads to use, without influence on the result; 0: one per core");
+}
+
+Expected<void> check(const RenderArguments& a) {
+  const std::string extension = lowerCaseExtension(a.output);
+  if (extension != ".png" && extension != ".exr")
+    return usageError("--output: " + a.output.string() + ": pictures are .png or .exr");
+  if (a.lookAt && !a.position) return usageError("--look-at needs --camera-position");
+  if (a.position && a.lookAt && *a.position == *a.lookAt)
+    return usageError("--look-at: the same point as --camera-position; it has no direction");
+  return {};
+}
+
+Expected<Camera> findCamera(const Scene& scene, const std::string& wanted) {
+  const auto& cameras = scene.cameras;
+  for (const Camera& camera : cameras)
+    if (camera.name == wanted) return camera;
+  std::size_t index = 0;
+  const auto [end, error] = std::from_chars(wanted.data(), wanted.data() + wanted.size(), index);
+  if (error == std::errc() && end == wanted.data() + wanted.size() && index < cameras.size()) return cameras[index];
+  std::string known;
+  for (const Camera& camera : cameras) known += (known.empty() ? "" : ", ") + ("'" + camera.name + "'");
+  return usageError("--camera: no camera '" + wanted + "'; the scene has " +
+                    (known.empty() ? "none; use auto" : known));
+}
+
+Expected<Camera> chooseCamera(const RenderArguments& a, const BakedScene& baked, const Compositor& compositor) {
+  constexpr float kOwnFov = 0.95f;
+  constexpr float kRadians = kPi / 180.0f;
+  Camera camera;
+  if (a.position) {
+    Vec3 target = a.lookAt.value_or(0.5f * (compositor.boundsMin() + compositor.boundsMax()));
+    if (target == *a.position) target.z -= 1.0f;
+    camera = cameraLookingAt(*a.position, target, kOwnFov);
+  } else if (a.camera == "auto" || (a.camera.empty() && baked.scene.cameras.empty())) {
+    const float aspect = a.width > 0 && a.height > 0 ? static_cast<float>(a.width) / static_cast<float>(a.height)
+                                                     : static_cast<float>(kDefaultWidth) / kDefaultHeight;
+    camera = chooseViewpoint(compositor, aspect);
+  } else if (a.camera.empty()) {
+    camera = baked.scene.cameras.front();
+  } else {
+    auto found = findCamera(baked.scene, a.camera);
+    if (!found) return found;
+    camera = *found;
+  }
+  if (a.fovDegrees > 0.0f) camera.yFov = a.fovDegrees * kRadians;
+  return camera;
+}
+
+RenderOptions resolve(const RenderArguments& a, const Camera& camera) {
+  const float aspect = camera.aspect > 0.0f ? camera.aspect : static_cast<float>(kDefaultWidth) / kDefaultHeight;
+  const auto pixels = [](float v) { return std::clamp(static_cast<int>(std::lround(v)), 1, 16384); };
+  RenderOptions options;
+  options.mode = a.mode;
+  options.samplesPerPixel = a.samplesPerPixel;
+  options.width = a.width > 0 ? a.width : a.height > 0 ? pixels(static_cast<float>(a.height) * aspect) : kDefaultWidth;
+  options.height = a.height > 0 ? a.height : pixels(static_cast<float>(options.width) / aspect);
+  return options;
+}
+
+std::string describe(const Camera& camera) {
+  const Vec3 p(camera.worldFromCamera[3]);
+  const Vec3 forward = -glm::normalize(Vec3(camera.worldFromCamera[2]));
+  char text[200];
+  std::snprintf(text, sizeof text, "%s at (%.4g, %.4g, %.4g) towards (%.3g, %.3g, %.3g)", camera.name.c_str(),
+                static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z),
+                static_cast<double>(forward.x), static_cast<double>(forward.y), static_cast<double>(forward.z));
+  return text;
+}
+
+Expected<void> writeStill(const RenderArguments& a, const Still& still, const std::string& camera, float exposure) {
+  WriteImageOptions options;
+  options.metadata = {{"lumel:version", kVersion}, {"lumel:camera", camera}};
+  if (lowerCaseExtension(a.output) == ".exr") {
+    options.metadata["lumel:units"] = "linear Rec. 709 radiance in nits, unexposed";
+    return writeImage(a.output, still.radiance, options);
+  }
+  options.format = PixelFormat::U8;
+  // Normals are no light and albedos no bright one: neither is exposed or bent by a curve.
+  if (a.mode == RenderMode::Normal) return writeImage(a.output, still.radiance, options);
+  const ToneMap curve = a.mode == RenderMode::Albedo ? ToneMap::Linear : a.toneMap;
+  return writeImage(a.output, toneMap(still.radiance, exposure, curve), options);
+}
+
+Expected<void> runRender(const RenderArguments& a, CommandContext& context) {
+  if (auto checked = check(a); !checked) return checked;
+  if (isBakeFile(a.output.filename().string()))
+    if (auto apart = checkNoInput(a.output, std::array{a.bake / a.output.filename()}); !apart) return apart;
+  const fs::path folder = a.output.has_parent_path() ? a.output.parent_path() : fs::path(".");
+  std::error_code ec;
+  fs::create_directories(folder, ec);
+  if (auto writable = checkWritable(folder); !writable) return writable;
+  const ThreadLimit limit(a.threads);
+  const auto baked = readBake(a.bake);
+  if (!baked) return baked.error();
+  const auto compositor = Compositor::make(*baked);
+  if (!compositor) return compositor.error();
+  if (!context.quiet)
+    for (const std::string& warning : compositor->warnings())
+      std::fprintf(stderr, "lumel: warning: %s\n", warning.c_str());
+  if (context.progress.cancelled()) return interrupted();
+
+  const auto camera = chooseCamera(a, *baked, *compositor);
+  if (!camera) return camera.error();
+  const RenderOptions options = resolve(a, *camera);
+  const auto still = compositor->render(*camera, options, context.progress);
+  if (!still) return still.error();
+
+  const bool light = a.mode == RenderMode::Lit || a.mode == RenderMode::Lightmap;
+  const float exposure = a.exposure ? *a.exposure : light ? autoExposure(still->radiance, still->lit) : 0.0f;
+  if (auto written = writeStill(a, *still, describe(*camera), exposure); !written) return written;
+  if (context.quiet) return {};
+  std::fprintf(stderr, "%s: %d x %d, camera %s", a.output.c_str(), options.width, options.height,
+               describe(*camera).c_str());
+  if (lowerCaseExtension(a.output) == ".exr")
+    std::fputs(", unexposed\n", stderr);
+  else
+    std::fprintf(stderr, ", exposure %.2f EV\n", static_cast<double>(exposure));
+  return {};
+}
+
+}  // namespace
+
+Command renderCommand() {
+  Command command;
+  const auto arguments = std::make_shared<RenderArguments>();
+  command.name = "render";
+  command.summary = "Render a still of a bake as a game would show it";
+  command.takesConfig = true;
+  command.examples =
+      "Examples:\n"
+      "  lumel render out/level -o out/level.png\n"
+      "      the scene's first camera, or a viewpoint found by looking around\n"
+      "  lumel render out/level -o light.png --mode lightmap\n"
+      "      the light alone, where leaks and seams show best\n"
+      "  lumel render out/level -o still.exr --camera-position 0 1.7 4 --look-at 0 1 0 --width 1920";
+  declareOptions(command.options, *arguments);
+  command.run = [arguments](CommandContext& context) { return runRender(*arguments, context); };
+  return command;
+}
+
+}  // namespace lumel

@@ -1,0 +1,110 @@
+#include "baker/commands/scene_arguments.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "baker/bake/lit_sides.h"
+#include "scene/images/environment.h"
+#include "scene/load/load_scene.h"
+
+namespace lumel {
+
+void declareScene(OptionTable& options, SceneArguments& a) {
+  options.positionalPath("scene", a.scene, "Scene: .gltf, .glb or .obj").placeholder = "SCENE";
+}
+
+void declareOutsidePaths(OptionTable& options, SceneArguments& a) {
+  options.flag("allow-outside-paths", a.allowOutsidePaths, "Let the scene name files outside its own folder");
+}
+
+void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas) {
+  options.group("Atlas");
+  options.choice("uv", atlas.uvSource, {"auto", "scene", "generate"},
+                 "Lightmap UVs: TEXCOORD_1 where it is valid, else generated (auto); TEXCOORD_1 or an error (scene); "
+                 "always generated (generate)");
+  options.number("texels-per-meter", atlas.texelsPerMeter, {0.0f, 1e6f},
+                 "Texel density; 0: the density that fills one page");
+  options.integer("page-size", atlas.pageSize, {4, 16384}, "Texels on a side of a page, a multiple of 4");
+  options.integer("padding", atlas.padding, {0, 256}, "Texels kept free between charts, at least");
+  options.number("max-stretch", atlas.maxStretch, {1.0f, 1000.0f},
+                 "A chart whose texels are stretched more than this is split");
+  options.integer("block-align", atlas.blockAlign, {0, 64},
+                  "Let no block of so many texels hold two charts, 4 for block compression; 0: off");
+}
+
+void declareSky(OptionTable& options, SceneArguments& a) {
+  options.color("sky-color", a.skyColor, {0.0f}, "Radiance of an even sky in nits, red green blue [none]");
+  options.path("sky", a.sky, "Sky image: equirectangular .hdr or .exr [none]");
+  options
+      .number("sky-rotation", a.skyRotation, {},
+              "Degrees by which the sky image is turned, counter-clockwise from above")
+      .placeholder = "DEGREES";
+  options.number("sky-strength", a.skyStrength, {0.0f}, "Factor on the sky image or colour");
+}
+
+void declareSkyAndSides(OptionTable& options, SceneArguments& a) {
+  declareSky(options, a);
+  options.choice("double-sided", a.doubleSided, {"lit", "wound"},
+                 "Side of double-sided surfaces that gets the lightmap: their front as it is wound, but the back where "
+                 "only that is lit (lit); always their front (wound)");
+}
+
+Expected<void> checkSky(const SceneArguments& a) {
+  if (!a.sky.empty() && a.skyColor != Vec3(0.0f))
+    return usageError("--sky and --sky-color: give one of them; --sky-strength scales either");
+  return {};
+}
+
+Expected<void> checkAtlas(const AtlasOptions& atlas) {
+  if (atlas.pageSize % 4 != 0)
+    return usageError("--page-size: " + std::to_string(atlas.pageSize) + " is not a multiple of 4");
+  return {};
+}
+
+Expected<Scene> loadSceneUnderSky(const SceneArguments& a) {
+  auto scene = loadScene(a.scene, {.allowOutsidePaths = a.allowOutsidePaths});
+  if (!scene) return scene;
+  if (!a.sky.empty()) {
+    auto sky = loadEnvironment(a.sky);
+    if (!sky) return sky.error();
+    scene->environment = std::move(*sky);
+  } else {
+    scene->environment.color = a.skyColor;
+  }
+  scene->environment.rotationDegrees = a.skyRotation;
+  scene->environment.strength = a.skyStrength;
+  if (!hasLight(*scene))
+    scene->report.warnings.insert(scene->report.warnings.begin(),
+                                  "the scene has no light and all will be black; give --sky-color or --sky");
+  return scene;
+}
+
+Expected<Scene> loadLitScene(const SceneArguments& a, const Progress& progress) {
+  auto scene = loadSceneUnderSky(a);
+  if (!scene) return scene;
+  if (a.doubleSided == DoubleSided::Wound || !hasLight(*scene)) return scene;
+  const auto turned = turnToLight(*scene, progress);
+  if (!turned) return turned.error();
+  if (*turned > 0)
+    scene->report.warnings.push_back(std::to_string(*turned) +
+                                     " double-sided triangles face the dark: their backs get the lightmap "
+                                     "(--double-sided wound: their fronts)");
+  return scene;
+}
+
+bool hasLight(const Scene& scene) {
+  const auto emits = [](const Material& m) { return m.emission != Vec3(0.0f) && !m.unlit; };
+  const auto shines = [](const Light& l) { return l.intensity > 0.0f && l.color != Vec3(0.0f); };
+  return !scene.environment.isBlack() || std::any_of(scene.lights.begin(), scene.lights.end(), shines) ||
+         std::any_of(scene.materials.begin(), scene.materials.end(), emits);
+}
+
+void printWarnings(const std::vector<std::string>& warnings) {
+  constexpr std::size_t kShown = 12;
+  for (std::size_t i = 0; i < std::min(warnings.size(), kShown); ++i)
+    std::fprintf(stderr, "lumel: warning: %s\n", warnings[i].c_str());
+  if (warnings.size() > kShown)
+    std::fprintf(stderr, "lumel: %zu more warnings; all are in bake.json\n", warnings.size() - kShown);
+}
+
+}  // namespace lumel

@@ -1,0 +1,54 @@
+// The options that say what is to be lit: those of every subcommand that bakes.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "baker/commands/options.h"
+#include "lightmap/atlas/atlas.h"
+#include "scene/base/expected.h"
+#include "scene/base/progress.h"
+#include "scene/scene.h"
+
+namespace lumel {
+
+/// The side of a double-sided surface that gets the lightmap.
+enum class DoubleSided {
+  Lit,    // the one that is wound to be its front, or the other where only that is lit (turnToLight)
+  Wound,  // the one that is wound to be its front
+};
+
+struct SceneArguments {
+  std::filesystem::path scene;
+  bool allowOutsidePaths = false;
+  DoubleSided doubleSided = DoubleSided::Lit;
+  Vec3 skyColor{0, 0, 0};
+  std::filesystem::path sky;
+  float skyRotation = 0.0f;
+  float skyStrength = 1.0f;
+};
+
+void declareScene(OptionTable& options, SceneArguments& a);
+void declareOutsidePaths(OptionTable& options, SceneArguments& a);
+void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas);
+void declareSky(OptionTable& options, SceneArguments& a);
+void declareSkyAndSides(OptionTable& options, SceneArguments& a);
+
+/// What the options cannot check one by one. Errors: Usage.
+Expected<void> checkSky(const SceneArguments& a);
+Expected<void> checkAtlas(const AtlasOptions& atlas);
+
+/// The scene with its sky; without any light a warning in its report says so. Errors: Input.
+Expected<Scene> loadSceneUnderSky(const SceneArguments& a);
+
+/// The scene with its sky, double-sided surfaces turned as asked for. Errors: Input, and those of turnToLight.
+Expected<Scene> loadLitScene(const SceneArguments& a, const Progress& progress);
+
+/// Whether anything shines.
+bool hasLight(const Scene& scene);
+
+/// The first few on stderr.
+void printWarnings(const std::vector<std::string>& warnings);
+
+}  // namespace lumel

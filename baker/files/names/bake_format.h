@@ -1,0 +1,21 @@
+// What bake.json holds, as far as its writer and its readers must agree on it.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace lumel {
+
+/// Version of the layout of bake.json; a reader refuses others.
+inline constexpr int kBakeFormat = 1;
+
+/// What a row of "charts" holds: page, object, density, number of triangles; then, for --layout-from, a key that stands
+/// for the object's name and the chart's triangles (null with the scene's own UVs), and where the chart's box lies.
+const std::vector<std::string>& chartColumns();
+
+/// The value of one of these columns in a row that has them all.
+const nlohmann::ordered_json& chartColumn(const nlohmann::ordered_json& row, std::string_view name);
+
+}  // namespace lumel

@@ -1,0 +1,172 @@
+#include "baker/files/read/baked_scene.h"
+
+#include <fstream>
+#include <iterator>
+
+#include "baker/files/names/bake_format.h"
+#include "baker/files/names/conventions.h"
+#include "baker/files/names/file_names.h"
+#include "scene/images/image_io.h"
+#include "scene/load/load_scene.h"
+
+namespace lumel {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// Access to JSON that may hold anything; the path names the place in messages.
+class Reader {
+ public:
+  Reader(const Json& json, std::string file, std::string path = "")
+      : json_(&json), file_(std::move(file)), path_(std::move(path)) {}
+
+  Expected<Reader> at(const std::string& key) const {
+    const auto found = json_->is_object() ? json_->find(key) : json_->end();
+    if (found == json_->end()) return inputError(file_ + ": " + path_ + "/" + key + " is missing; bake again");
+    return Reader(*found, file_, path_ + "/" + key);
+  }
+  Expected<std::string> textAt(const std::string& key) const {
+    auto value = at(key);
+    if (!value) return value.error();
+    if (!value->json_->is_string()) return value->wrong("a text");
+    return value->json_->get<std::string>();
+  }
+  Expected<double> numberAt(const std::string& key) const {
+    auto value = at(key);
+    if (!value) return value.error();
+    if (!value->json_->is_number()) return value->wrong("a number");
+    return value->json_->get<double>();
+  }
+  Expected<Vec3> vectorAt(const std::string& key) const {
+    auto value = at(key);
+    if (!value) return value.error();
+    const Json& array = *value->json_;
+    if (!array.is_array() || array.size() != 3 || !array[0].is_number() || !array[1].is_number() ||
+        !array[2].is_number())
+      return value->wrong("three numbers");
+    return Vec3(array[0].get<float>(), array[1].get<float>(), array[2].get<float>());
+  }
+  const Json& json() const { return *json_; }
+  Error wrong(const std::string& wanted) const { return inputError(file_ + ": " + path_ + " is not " + wanted); }
+
+ private:
+  const Json* json_;
+  std::string file_;
+  std::string path_;
+};
+
+Expected<RnmDecode> readDecode(const Reader& root) {
+  const auto conventions = root.at("conventions");
+  if (!conventions) return conventions.error();
+  const auto name = conventions->textAt("decode");
+  if (!name) return name.error();
+  for (RnmDecode decode : {RnmDecode::Squared, RnmDecode::Linear, RnmDecode::LinearNormalized})
+    if (*name == nameOf(decode)) return decode;
+  return conventions->wrong("a decode known here ('" + *name + "')");
+}
+
+Expected<void> readPages(const Reader& root, const fs::path& dir, BakedScene& baked) {
+  const auto pages = root.at("pages");
+  if (!pages) return pages.error();
+  if (!pages->json().is_array()) return pages->wrong("a list");
+  double texels = 0.0;
+  Vec3d light(0.0);
+  for (std::size_t i = 0; i < pages->json().size(); ++i) {
+    const Reader page(pages->json()[i], (dir / "bake.json").string(), "/pages/" + std::to_string(i));
+    const auto width = page.numberAt("width");
+    const auto height = page.numberAt("height");
+    const auto covered = page.numberAt("coveredTexels");
+    const auto mean = page.vectorAt("meanFlat");
+    for (const Expected<double>* number : {&width, &height, &covered})
+      if (!*number) return number->error();
+    if (!mean) return mean.error();
+    texels += *covered;
+    light += Vec3d(*mean) * *covered;
+    std::array<Image, 3>& maps = baked.pages.emplace_back();
+    for (std::size_t k = 0; k < maps.size(); ++k) {
+      const fs::path file = dir / pageFileName(i, "rnm" + std::to_string(k));
+      auto loaded = readImage(file);
+      if (!loaded) return loaded.error();
+      if (loaded->image.channels != 3 || loaded->image.width != static_cast<int>(*width) ||
+          loaded->image.height != static_cast<int>(*height))
+        return inputError(file.string() + ": its size or channels differ from bake.json; bake again");
+      maps[k] = std::move(loaded->image);
+    }
+  }
+  if (texels > 0.0) baked.meanFlat = Vec3(light / texels);
+  return {};
+}
+
+Expected<void> readSky(const Reader& root, const fs::path& dir, Environment& sky) {
+  sky = Environment{};
+  const auto json = root.at("sky");
+  if (!json) return json.error();
+  if (json->json().is_null()) return {};
+  const auto strength = json->numberAt("strength");
+  if (!strength) return strength.error();
+  sky.strength = static_cast<float>(*strength);
+  if (!json->json().contains("file")) {
+    const auto color = json->vectorAt("color");
+    if (!color) return color.error();
+    sky.color = *color;
+    return {};
+  }
+  const auto rotation = json->numberAt("rotationDegrees");
+  if (!rotation) return rotation.error();
+  sky.rotationDegrees = static_cast<float>(*rotation);
+  auto loaded = readImage(dir / "sky.exr");
+  if (!loaded) return loaded.error();
+  if (loaded->image.channels != 3) return inputError((dir / "sky.exr").string() + ": not an RGB image");
+  sky.image = std::move(loaded->image);
+  return {};
+}
+
+Expected<void> checkPages(const BakedScene& baked, const fs::path& file) {
+  for (const Mesh& mesh : baked.scene.meshes)
+    for (const Primitive& primitive : mesh.primitives) {
+      if (primitive.lightmapPage < 0) continue;
+      if (static_cast<std::size_t>(primitive.lightmapPage) >= baked.pages.size())
+        return inputError(file.string() + ": " + primitive.name + " lies on page " +
+                          std::to_string(primitive.lightmapPage) + ", bake.json knows " +
+                          std::to_string(baked.pages.size()) + "; bake again");
+      if (primitive.uvSets.size() < 2 || primitive.uvSets[1].empty())
+        return inputError(file.string() + ": " + primitive.name + " has a lightmap page but no TEXCOORD_1; bake again");
+    }
+  return {};
+}
+
+}  // namespace
+
+Expected<Json> readBakeJson(const fs::path& dir) {
+  const fs::path file = dir / "bake.json";
+  std::ifstream in(file, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  if (!in.is_open() || in.bad())
+    return inputError(file.string() + ": cannot be read; give the folder that lumel bake -o wrote");
+  Json json = Json::parse(text, nullptr, false);
+  if (json.is_discarded() || !json.is_object()) return inputError(file.string() + ": not valid JSON; bake again");
+  if (json.value("format", Json()) != Json(kBakeFormat))
+    return inputError(file.string() + ": its format is not " + std::to_string(kBakeFormat) +
+                      ", the one that this version reads; bake again");
+  return json;
+}
+
+Expected<BakedScene> readBake(const fs::path& dir) {
+  const auto json = readBakeJson(dir);
+  if (!json) return json.error();
+  const Reader root(*json, (dir / "bake.json").string());
+  BakedScene baked;
+  const auto decode = readDecode(root);
+  if (!decode) return decode.error();
+  baked.decode = *decode;
+  auto scene = loadScene(dir / "scene.glb");
+  if (!scene) return scene.error();
+  baked.scene = std::move(*scene);
+  if (auto done = readSky(root, dir, baked.scene.environment); !done) return done.error();
+  if (auto done = readPages(root, dir, baked); !done) return done.error();
+  if (auto done = checkPages(baked, dir / "scene.glb"); !done) return done.error();
+  return baked;
+}
+
+}  // namespace lumel

@@ -1,0 +1,103 @@
+#include "baker/files/write/bake_files.h"
+
+#include "baker/files/names/conventions.h"
+#include "baker/files/names/file_names.h"
+#include "baker/files/names/version.h"
+#include "baker/files/write/bake_json.h"
+#include "baker/files/write/glb_writer.h"
+#include "scene/base/parallel.h"
+#include "scene/images/image_io.h"
+
+namespace lumel {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::map<std::string, std::string> pageMetadata(std::size_t page, const std::string& kind, const BakeRecord& record) {
+  std::map<std::string, std::string> metadata;
+  for (const auto& [key, text] : describeConventions(record.bakeOptions.projection)) metadata["lumel:" + key] = text;
+  metadata["lumel:version"] = kVersion;
+  metadata["lumel:page"] = std::to_string(page);
+  metadata["lumel:map"] = kind;
+  metadata["lumel:integrator"] = nameOf(record.bakeOptions.integrator);
+  metadata["lumel:samples"] = std::to_string(record.bakeOptions.samples);
+  metadata["lumel:bounces"] = describeBounces(record.bakeOptions.bounces);
+  metadata["lumel:seed"] = std::to_string(record.bakeOptions.seed);
+  metadata["lumel:dilate"] = std::to_string(record.dilate);
+  if (kind == "aux") {
+    metadata["lumel:units"] =
+        "coverage: area share 0..1; validity: share of gather rays that met no back face; stderr: standard error of "
+        "the flat map's luminance; samples: gather rays";
+    for (const char* key : {"decode", "decodeFormula", "basis", "order"}) metadata.erase(std::string("lumel:") + key);
+  }
+  return metadata;
+}
+
+/// One image of a bake on its way to its file.
+struct ImageFile {
+  PendingFile file;
+  const Image* image;
+  WriteImageOptions options;
+};
+
+Expected<void> addPage(FileSet& set, const fs::path& dir, std::size_t page, const BakedPage& baked,
+                       const BakeRecord& record, std::vector<ImageFile>& files) {
+  WriteImageOptions options;
+  options.format = record.half ? PixelFormat::Half : PixelFormat::Float;
+  options.noisy = !record.half;
+  const auto add = [&](const std::string& kind, const Image& image) -> Expected<void> {
+    options.metadata = pageMetadata(page, kind, record);
+    auto file = set.add(dir / pageFileName(page, kind));
+    if (!file) return file.error();
+    files.push_back({std::move(*file), &image, options});
+    return {};
+  };
+  for (std::size_t i = 0; i < 3; ++i)
+    if (auto added = add("rnm" + std::to_string(i), baked.rnm[i]); !added) return added;
+  if (auto added = add("flat", baked.flat); !added) return added;
+  // Sample counts and coverage are exact in float only.
+  options.format = PixelFormat::Float;
+  options.noisy = false;
+  options.channelNames = {"coverage", "validity", "stderr", "samples"};
+  return add("aux", baked.aux);
+}
+
+/// Compression takes most of the time, and a file at a time leaves cores idle.
+Expected<void> writeImages(const std::vector<ImageFile>& files) {
+  std::vector<Expected<void>> done(files.size());
+  parallelFor(files.size(), 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) done[i] = writeImage(files[i].file, *files[i].image, files[i].options);
+  });
+  for (Expected<void>& d : done)
+    if (!d) return std::move(d);
+  return {};
+}
+
+}  // namespace
+
+Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasResult& atlas, const BakeResult& result,
+                         const BakeRecord& record) {
+  auto set = FileSet::forFolder(dir);
+  if (!set) return set.error();
+  std::vector<ImageFile> files;
+  for (std::size_t page = 0; page < result.pages.size(); ++page)
+    if (auto added = addPage(*set, dir, page, result.pages[page], record, files); !added) return added;
+  if (!scene.environment.isBlack() && !scene.environment.image.empty()) {
+    auto sky = set->add(dir / "sky.exr");
+    if (!sky) return sky.error();
+    files.push_back({std::move(*sky), &scene.environment.image, {}});
+  }
+  if (auto done = writeImages(files); !done) return done;
+  const auto writeFile = [&](const char* name, const auto& bytes) -> Expected<void> {
+    const auto file = set->add(dir / name);
+    if (!file) return file.error();
+    return writeBytes(*file, bytes);
+  };
+  const auto glb = encodeGlb(scene, atlas.atlas);
+  if (!glb) return glb.error();
+  if (auto done = writeFile("scene.glb", std::span<const std::vector<std::uint8_t>>(*glb)); !done) return done;
+  if (auto done = writeFile("bake.json", describeBake(scene, atlas, result, record)); !done) return done;
+  return set->commitFolder(isBakeFile);
+}
+
+}  // namespace lumel

@@ -1,0 +1,194 @@
+#include "baker/files/write/bake_json.h"
+
+#include <cstdio>
+
+#include "baker/files/names/bake_format.h"
+#include "baker/files/names/conventions.h"
+#include "baker/files/names/file_names.h"
+#include "baker/files/names/version.h"
+
+namespace lumel {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json toJson(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
+
+Json describePage(std::size_t index, const BakedPage& page, std::size_t charts) {
+  std::size_t covered = 0;
+  std::size_t invalid = 0;
+  double area = 0.0;
+  Vec3d sum(0.0);
+  std::size_t counted = 0;
+  for (int y = 0; y < page.aux.height; ++y)
+    for (int x = 0; x < page.aux.width; ++x) {
+      const float* aux = page.aux.at(x, y);
+      if (!(aux[0] > 0.0f)) continue;
+      ++covered;
+      area += static_cast<double>(aux[0]);
+      if (aux[1] < 0.5f) {
+        ++invalid;
+        continue;
+      }
+      sum += Vec3d(page.flat.rgb(x, y));
+      ++counted;
+    }
+  const double texels = static_cast<double>(page.aux.width) * static_cast<double>(page.aux.height);
+  const Vec3d mean = counted > 0 ? sum / static_cast<double>(counted) : sum;
+  Json files = {{"rnm", {pageFileName(index, "rnm0"), pageFileName(index, "rnm1"), pageFileName(index, "rnm2")}},
+                {"flat", pageFileName(index, "flat")},
+                {"aux", pageFileName(index, "aux")}};
+  return {{"page", index},
+          {"width", page.aux.width},
+          {"height", page.aux.height},
+          {"charts", charts},
+          {"coveredTexels", covered},
+          {"coverage", texels > 0 ? static_cast<double>(covered) / texels : 0.0},
+          {"coveredArea", texels > 0 ? area / texels : 0.0},
+          {"invalidTexels", invalid},
+          {"meanFlat", {mean.x, mean.y, mean.z}},
+          {"files", std::move(files)}};
+}
+
+Json describePages(const Atlas& atlas, const BakeResult& result) {
+  std::vector<std::size_t> charts(result.pages.size(), 0);
+  for (const Chart& chart : atlas.charts)
+    if (const auto page = static_cast<std::size_t>(atlas.surfaces[static_cast<std::size_t>(chart.surface)].page);
+        page < charts.size())
+      ++charts[page];
+  Json pages = Json::array();
+  for (std::size_t i = 0; i < result.pages.size(); ++i) pages.push_back(describePage(i, result.pages[i], charts[i]));
+  return pages;
+}
+
+std::string hexOf(std::uint64_t value) {
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(value));
+  return text;
+}
+
+Json describeCharts(const Atlas& atlas) {
+  std::vector<std::size_t> triangles(atlas.charts.size(), 0);
+  for (const Surface& surface : atlas.surfaces)
+    for (std::uint32_t chart : surface.charts) ++triangles[chart];
+  Json rows = Json::array();
+  for (std::size_t i = 0; i < atlas.charts.size(); ++i) {
+    const Chart& chart = atlas.charts[i];
+    const Surface& surface = atlas.surfaces[static_cast<std::size_t>(chart.surface)];
+    rows.push_back({surface.page, surface.instance, surface.primitive, chart.texelsPerMeter, triangles[i],
+                    chart.key != 0 ? Json(hexOf(chart.key)) : Json(nullptr), chart.quarterTurns, chart.x, chart.y});
+  }
+  return {{"columns", chartColumns()}, {"rows", std::move(rows)}};
+}
+
+/// What a later bake needs to keep charts where they are (with the list of charts). Null without generated charts.
+Json describeLayout(const Atlas& atlas, const AtlasOptions& options) {
+  if (!(atlas.chartDensity > 0)) return nullptr;
+  return {{"chartDensity", atlas.chartDensity}, {"scale", atlas.chartScale},  {"firstPage", atlas.sceneUvPages},
+          {"pageSize", options.pageSize},       {"padding", options.padding}, {"blockAlign", options.blockAlign},
+          {"maxStretch", options.maxStretch}};
+}
+
+Json describeSceneUvs(const AtlasReport& report) {
+  Json rows = Json::array();
+  for (const UvReport& uv : report.sceneUvs)
+    rows.push_back({{"mesh", uv.mesh},
+                    {"present", uv.present},
+                    {"valid", uv.valid},
+                    {"outOfRangeVertices", uv.outOfRangeVertices},
+                    {"zeroAreaTriangles", uv.zeroAreaTriangles},
+                    {"overlapTexels", uv.overlapTexels},
+                    {"coveredTexels", uv.coveredTexels},
+                    {"frameCrossingTexels", uv.frameCrossingTexels}});
+  return rows;
+}
+
+Json describeSky(const Environment& sky) {
+  if (sky.isBlack()) return nullptr;
+  Json json = {{"strength", sky.strength}};
+  if (sky.image.empty()) {
+    json["color"] = toJson(sky.color);
+  } else {
+    json["file"] = "sky.exr";
+    json["rotationDegrees"] = sky.rotationDegrees;
+  }
+  return json;
+}
+
+Json describeScene(const Scene& scene, const BakeRecord& record) {
+  return {{"file", record.sceneFile.string()},
+          {"instances", scene.instances.size()},
+          {"materials", scene.materials.size()},
+          {"lights", scene.lights.size()},
+          {"degenerateTriangles", scene.report.degenerateTriangles},
+          {"skippedPrimitives", scene.report.skippedPrimitives}};
+}
+
+Json describeError(const BakeStats& stats) {
+  const Json error = stats.meanStandardError ? Json(*stats.meanStandardError) : Json(nullptr);
+  return {{"meanFlat", stats.meanFlat},
+          {"meanStandardError", error},
+          {"projectionResidual", stats.projectionResidual},
+          {"nonFiniteSamples", stats.nonFiniteSamples}};
+}
+
+Json describeRun(const BakeStats& stats, const BakeRecord& record) {
+  Json stages = Json::object();
+  double seconds = 0.0;
+  for (const StageTime& stage : record.stages) {
+    stages[stage.stage] = stage.seconds;
+    seconds += stage.seconds;
+  }
+  return {
+      {"threads", record.threads},
+      {"seconds", seconds},
+      {"stageSeconds", std::move(stages)},
+      {"raysPerSecond", stats.seconds > 0 ? static_cast<double>(stats.rays + stats.shadowRays) / stats.seconds : 0.0},
+      {"peakMemoryBytes", record.peakMemoryBytes}};
+}
+
+}  // namespace
+
+std::string describeBake(const Scene& scene, const AtlasResult& atlas, const BakeResult& result,
+                         const BakeRecord& record) {
+  std::vector<std::string> warnings = scene.report.warnings;
+  warnings.insert(warnings.end(), atlas.report.warnings.begin(), atlas.report.warnings.end());
+  Json json;
+  json["format"] = kBakeFormat;
+  json["lumel"] = kVersion;
+  json["scene"] = describeScene(scene, record);
+  json["settings"] = record.settings;
+  json["conventions"] = describeConventions(record.bakeOptions.projection);
+  json["conventions"]["aux"] = "channels coverage, validity, stderr, samples, by name (EXR files sort channels)";
+  json["sky"] = describeSky(scene.environment);
+  json["atlas"] = {{"texelsPerMeter", atlas.atlas.texelsPerMeter},
+                   {"charts", atlas.atlas.charts.size()},
+                   {"generatedCharts", atlas.report.generatedCharts},
+                   {"nonManifoldEdges", atlas.report.nonManifoldEdges},
+                   {"degenerateTriangles", atlas.report.degenerateTriangles},
+                   {"sceneUvs", describeSceneUvs(atlas.report)},
+                   {"layout", describeLayout(atlas.atlas, record.atlasOptions)}};
+  json["pages"] = describePages(atlas.atlas, result);
+  json["cost"] = {
+      {"texels", result.stats.texels}, {"rays", result.stats.rays}, {"shadowRays", result.stats.shadowRays}};
+  json["error"] = describeError(result.stats);
+  json["warnings"] = warnings;
+  json["notes"] = result.stats.notes;
+  json["charts"] = describeCharts(atlas.atlas);
+  json["run"] = describeRun(result.stats, record);
+  // Names come from files and need not be valid UTF-8.
+  const auto dump = [](const Json& value, int indent) {
+    return value.dump(indent, ' ', false, Json::error_handler_t::replace);
+  };
+  // One line per entry of the first level down keeps long lists readable and small.
+  std::string text = "{";
+  const char* separator = "\n";
+  for (const auto& [key, value] : json.items()) {
+    const bool compact = key == "charts";
+    text += separator + dump(Json(key), -1) + ": " + dump(value, compact ? -1 : 2);
+    separator = ",\n";
+  }
+  return text + "\n}\n";
+}
+
+}  // namespace lumel

@@ -1,0 +1,220 @@
+#include "baker/gather/gather_kernels.h"
+
+#include <cstring>
+#include <limits>
+
+#include "baker/gather/texel_cache.h"
+#include "baker/rays/sampling.h"
+#include "lightmap/maps/rnm_basis.h"
+
+namespace lumel {
+namespace {
+
+constexpr float kLeastComponent = 1e-12f;
+constexpr float kBelowOne = 1.0f - 0x1p-24f;
+
+inline float awayFromZero(float component) {
+  const float least = pick(component < 0.0f, -kLeastComponent, kLeastComponent);
+  return pick((component < kLeastComponent) & (component > -kLeastComponent), least, component);
+}
+
+/// `sampleDirection` has filled rays.dirTangent.
+[[gnu::always_inline]] inline void aim(const PointLanes& from, AimedRays& rays) {
+  RTCRay16& ray = rays.packet.rayhit.ray;
+  RTCHit16& hit = rays.packet.rayhit.hit;
+#pragma GCC ivdep
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Vec3 world = from.frame[lane].fromLocal(rays.dirTangent[lane]);
+    const bool above = glm::dot(world, from.ng[lane]) > 0.0f;
+    rays.pdf[lane] = gatherHemispherePdf(rays.dirTangent.z[lane]);
+    ray.org_x[lane] = from.rayStart.x[lane];
+    ray.org_y[lane] = from.rayStart.y[lane];
+    ray.org_z[lane] = from.rayStart.z[lane];
+    ray.dir_x[lane] = awayFromZero(world.x);
+    ray.dir_y[lane] = awayFromZero(world.y);
+    ray.dir_z[lane] = awayFromZero(world.z);
+    ray.tfar[lane] = std::numeric_limits<float>::infinity();
+    hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
+    hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
+    rays.packet.valid[lane] = above ? -1 : 0;
+  }
+}
+
+/// `y0` and `dy`: of GuideTable, for each lane.
+template <class Column>
+[[gnu::always_inline]] inline void aimStretched(const GuidedPoints& points, float x0, float dx, const Column& y0,
+                                                const Column& dy, AimedRays& rays) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const float x = x0 + dx * points.x[lane];
+    const float y = y0[lane] + dy[lane] * points.y[lane];
+    rays.stretch[lane] = dx * dy[lane];
+    // Rounding must not lead to the horizon, where the density ends.
+    rays.dirTangent.set(lane, sampleGatherHemisphere({x < kBelowOne ? x : kBelowOne, y}));
+  }
+}
+
+/// One value for all lanes.
+struct Same {
+  float value;
+  float operator[](std::size_t) const { return value; }
+};
+struct alignas(64) Each {
+  float value[kLanes];
+  float operator[](std::size_t lane) const { return value[lane]; }
+};
+
+}  // namespace
+
+GuidedPoints guidedPoints(const NetLanes& net, std::uint32_t cell) {
+  const int bitsX = (net.net().log2Count + 1) / 2, bitsY = net.net().log2Count / 2;
+  const NetCell at = netCell(cell);
+  return {.x = net.x(cell),
+          .y = net.y(cell),
+          .row = (at.x * kGuideRows) >> bitsX,
+          .column = (at.y * kGuideColumns) >> bitsY,
+          .columns = std::max(1u, kGuideColumns >> bitsY)};
+}
+
+LUMEL_FOR_EACH_CPU void aimGatherRays(const GuidedPoints& points, const GuideTable& guide, const PointLanes& from,
+                                      AimedRays& rays) {
+  const float x0 = guide.x0[points.row], dx = guide.dx[points.row];
+  const auto& y0 = guide.y0[points.row];
+  const auto& dy = guide.dy[points.row];
+  const std::uint32_t first = points.column;
+  if (points.columns == 1) {
+    aimStretched(points, x0, dx, Same{y0[first]}, Same{dy[first]}, rays);
+  } else {
+    Each start, scale;
+    std::fill_n(start.value, kLanes, y0[first]);
+    std::fill_n(scale.value, kLanes, dy[first]);
+    for (std::uint32_t column = first + 1; column < first + points.columns; ++column) {
+      const float border = static_cast<float>(column) / static_cast<float>(kGuideColumns);
+      const float startHere = y0[column], scaleHere = dy[column];
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        const bool reaches = points.y[lane] >= border;
+        start.value[lane] = pick(reaches, startHere, start.value[lane]);
+        scale.value[lane] = pick(reaches, scaleHere, scale.value[lane]);
+      }
+    }
+    aimStretched(points, x0, dx, start, scale, rays);
+  }
+  aim(from, rays);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) rays.weight[lane] = kInvPi * rays.stretch[lane] / rays.pdf[lane];
+}
+
+LUMEL_FOR_EACH_CPU void aimCosineRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    rays.dirTangent.set(lane, sampleCosineHemisphere({x[lane], y[lane]}));
+  aim(from, rays);
+}
+
+LUMEL_FOR_EACH_CPU int differentNeighbours(const RayPacket& packet) {
+  const RTCHit16& hit = packet.rayhit.hit;
+  int count = 0;
+  for (std::size_t lane = 0; lane + 1 < kLanes; ++lane) {
+    const bool differs = (hit.geomID[lane] != hit.geomID[lane + 1]) | (hit.primID[lane] != hit.primID[lane + 1]);
+    // The triangle of a ray that missed is what the lane found before.
+    const bool missed =
+        (hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID) & (hit.geomID[lane + 1] == RTC_INVALID_GEOMETRY_ID);
+    count += (differs & !missed) ? 1 : 0;
+  }
+  return count;
+}
+
+LUMEL_FOR_EACH_CPU FoundTexels sortFound(const RayPacket& packet, const std::array<std::uint32_t, kLanes>& texels,
+                                         std::uint32_t others) {
+  FoundTexels found;
+  alignas(64) std::uint32_t ofRays[kLanes], ofHits[kLanes], ofTexels[kLanes];
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    ofRays[lane] = packet.valid[lane] != 0 ? 1u << lane : 0u;
+    ofHits[lane] = packet.rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID ? ofRays[lane] : 0u;
+    ofTexels[lane] = (texels[lane] != kNoTexel ? ofHits[lane] : 0u) & ~others;
+    found.texels[lane] = ofTexels[lane] != 0 ? texels[lane] : 0u;
+  }
+  // Loops of their own: in the one above the compiler would leave all scalar.
+  std::uint32_t rays = 0, hits = 0, lookedUp = 0;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) rays |= ofRays[lane];
+  for (std::size_t lane = 0; lane < kLanes; ++lane) hits |= ofHits[lane];
+  for (std::size_t lane = 0; lane < kLanes; ++lane) lookedUp |= ofTexels[lane];
+  found.lookedUp = lookedUp;
+  found.others = hits & ~lookedUp;
+  found.missed = rays & ~hits;
+  return found;
+}
+
+LUMEL_FOR_EACH_CPU void lookUpLight(const FoundTexels& found, const PackedColor* radiance, std::uint32_t stride,
+                                    const float* weight, Vec3Lanes& light) {
+  static_assert(sizeof(PackedColor) == 8);
+  std::array<LaneWords, 2> columns;
+  turnRows<2>([&](std::size_t lane) { return radiance + std::size_t{found.texels[lane]} * stride; }, columns);
+  alignas(64) std::uint32_t packed[2][kLanes];
+  std::memcpy(packed, &columns, sizeof packed);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const bool isLookedUp = (found.lookedUp & (1u << lane)) != 0;
+    const Vec3 arriving = weight[lane] * unpackColor(packed[0][lane], packed[1][lane]);
+    light.set(lane, pick(isLookedUp, arriving, Vec3(0.0f)));
+  }
+}
+
+LUMEL_FOR_EACH_CPU bool addLight(const Vec3Lanes& dirTangent, const Vec3Lanes& kernels, const Vec3Lanes& light,
+                                 MapSums& sums) {
+  alignas(64) float red[kLanes], green[kLanes], blue[kLanes];
+  int lost = 0;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const float any = light.x[lane] + light.y[lane] + light.z[lane];
+    const bool isNumber = any - any == 0.0f;
+    lost |= isNumber ? 0 : 1;
+    red[lane] = isNumber ? light.x[lane] : 0.0f;
+    green[lane] = isNumber ? light.y[lane] : 0.0f;
+    blue[lane] = isNumber ? light.z[lane] : 0.0f;
+  }
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const float k[4] = {std::max(0.0f, dirTangent.z[lane]), kernels.x[lane], kernels.y[lane], kernels.z[lane]};
+    sums.sum[0][lane] += red[lane] * k[0];
+    sums.sum[1][lane] += green[lane] * k[0];
+    sums.sum[2][lane] += blue[lane] * k[0];
+    sums.sum[3][lane] += red[lane] * k[1];
+    sums.sum[4][lane] += green[lane] * k[1];
+    sums.sum[5][lane] += blue[lane] * k[1];
+    sums.sum[6][lane] += red[lane] * k[2];
+    sums.sum[7][lane] += green[lane] * k[2];
+    sums.sum[8][lane] += blue[lane] * k[2];
+    sums.sum[9][lane] += red[lane] * k[3];
+    sums.sum[10][lane] += green[lane] * k[3];
+    sums.sum[11][lane] += blue[lane] * k[3];
+  }
+  return lost != 0;
+}
+
+LUMEL_FOR_EACH_CPU void clampedDots(const Vec3Lanes& dirTangent, Vec3Lanes& kernels) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Vec3 dir = dirTangent[lane];
+    const float above = dir.z > 0.0f ? 1.0f : 0.0f;
+    kernels.x[lane] = above * std::max(0.0f, glm::dot(dir, kRnmBasis[0]));
+    kernels.y[lane] = above * std::max(0.0f, glm::dot(dir, kRnmBasis[1]));
+    kernels.z[lane] = above * std::max(0.0f, glm::dot(dir, kRnmBasis[2]));
+  }
+}
+
+LUMEL_FOR_EACH_CPU void keepVisible(const ShadowPacket& shadows, float weight, Vec3Lanes& light) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const bool visible = (shadows.valid[lane] != 0) & (shadows.ray.tfar[lane] >= 0.0f);
+    light.x[lane] = pick(visible, light.x[lane] * weight, 0.0f);
+    light.y[lane] = pick(visible, light.y[lane] * weight, 0.0f);
+    light.z[lane] = pick(visible, light.z[lane] * weight, 0.0f);
+  }
+}
+
+LUMEL_FOR_EACH_CPU void turnToTangent(const FrameLanes& frame, const Vec3Lanes& dirWorld, Vec3Lanes& dirTangent) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) dirTangent.set(lane, frame[lane].toLocal(dirWorld[lane]));
+}
+
+LUMEL_FOR_EACH_CPU void settle(MapSums& sums, MapTotals& totals) {
+  for (std::size_t map = 0; map < 12; ++map)
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      totals.sum[map][lane] += static_cast<double>(sums.sum[map][lane]);
+      sums.sum[map][lane] = 0.0f;
+    }
+}
+
+}  // namespace lumel

@@ -1,0 +1,85 @@
+// The inner loops of the gather, over the lanes of a wave: aiming rays, and adding what they found to the maps.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "baker/gather/gather_guide.h"
+#include "baker/gather/packed_color.h"
+#include "baker/gather/wave_points.h"
+#include "baker/rays/lanes.h"
+#include "baker/rays/stratified_net.h"
+
+namespace lumel {
+
+/// The gather rays of a wave: each lane's goes out from its own point.
+struct AimedRays {
+  Vec3Lanes dirTangent;
+  alignas(64) float pdf[kLanes] = {};      // the gather's density per solid angle, by which it is weighed with lights
+  alignas(64) float stretch[kLanes] = {};  // pdf over the density with which the ray was aimed
+  alignas(64) float weight[kLanes] = {};   // of the light that it finds: stretch / (pi pdf)
+  RayPacket packet;
+};
+
+/// The points of a net's cell, which lie in one row of a guide; from 2^kLeastGuided points on nets are so fine.
+struct GuidedPoints {
+  const float* x;  // kLanes values each
+  const float* y;
+  std::uint32_t row = 0;
+  std::uint32_t column = 0;   // the first that they lie in
+  std::uint32_t columns = 1;  // and how many there are
+};
+inline constexpr int kLeastGuided = 3;
+static_assert(kGuideRows == 4);
+GuidedPoints guidedPoints(const NetLanes& net, std::uint32_t cell);
+
+/// Aims by sampleGatherHemisphere where the guide leads the points. Lanes whose ray would go below the geometric
+/// surface, and those without a texel, are not valid: a bent shading normal gathers from there too, where nothing
+/// arrives. No component of a ray's direction is nearer to zero than 1e-12 (see TraceMode::Coherent).
+void aimGatherRays(const GuidedPoints& points, const GuideTable& guide, const PointLanes& from, AimedRays& rays);
+
+/// The same by the cosine at u = (x, y), unguided; `pdf` is still the gather's, and there are no weights.
+void aimCosineRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays);
+
+/// How many rays of a traced packet found something else than the lane before theirs; 0 to kLanes - 1.
+int differentNeighbours(const RayPacket& packet);
+
+/// What the rays of a packet found, as bits of lanes.
+struct FoundTexels {
+  alignas(64) std::array<std::uint32_t, kLanes> texels;  // by lane; 0 where none is to be looked up
+  std::uint32_t lookedUp = 0;
+  std::uint32_t others = 0;  // what a ray hit is not to be looked up
+  std::uint32_t missed = 0;
+};
+/// `texels`: kNoTexel where there is none; `others`: bits of more lanes that are not to be looked up.
+FoundTexels sortFound(const RayPacket& packet, const std::array<std::uint32_t, kLanes>& texels, std::uint32_t others);
+
+/// light = radiance[texel * stride] * weight for the lanes that are looked up, else 0.
+void lookUpLight(const FoundTexels& found, const PackedColor* radiance, std::uint32_t stride, const float* weight,
+                 Vec3Lanes& light);
+
+/// Sums of irradiance / pi over a few samples: of the flat map's three colours, then of those of the RNM maps.
+struct alignas(64) MapSums {
+  float sum[12][kLanes] = {};
+};
+struct alignas(64) MapTotals {
+  double sum[12][kLanes] = {};
+};
+
+/// Adds light that arrives along dirTangent: times max(0, z) to the flat map, times the kernels to the others.
+/// Light that is not finite is left out; returns whether there was any.
+bool addLight(const Vec3Lanes& dirTangent, const Vec3Lanes& kernels, const Vec3Lanes& light, MapSums& sums);
+
+/// RnmKernels::clampedDots for all lanes.
+void clampedDots(const Vec3Lanes& dirTangent, Vec3Lanes& kernels);
+
+/// Light that nothing keeps away, times `weight`; the other lanes' becomes zero.
+void keepVisible(const ShadowPacket& shadows, float weight, Vec3Lanes& light);
+
+/// dirTangent = frame.toLocal(dirWorld).
+void turnToTangent(const FrameLanes& frame, const Vec3Lanes& dirWorld, Vec3Lanes& dirTangent);
+
+/// Moves the sums to the totals.
+void settle(MapSums& sums, MapTotals& totals);
+
+}  // namespace lumel

@@ -1,0 +1,61 @@
+#include "baker/gather/light_effort.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lumel {
+namespace {
+
+/// Cost of a gather ray with all that follows, in light samples.
+constexpr float kGatherCost = 4.0f;
+/// Standard deviation, as a share of a texel's light, below which more light samples are not worth their time.
+constexpr float kSmoothEnough = 0.15f;
+/// The share of waves that see no difference and yet are crossed by an edge that they missed.
+constexpr float kMissedEdges = 0.01f;
+constexpr int kFewest = -3;  // powers of two
+constexpr int kMost = 2;
+
+float deviation(const LightSpread& spread) {
+  const float missed = spread.unshadowed * kMissedEdges / (1.0f + spread.samples * kLanes);
+  return std::sqrt(spread.variance + missed);
+}
+
+}  // namespace
+
+void LightTally::enter(LightSpread& spread, std::uint32_t samples, std::size_t texels) const {
+  if (samples == 0 || texels == 0) return;
+  const auto n = static_cast<float>(samples);
+  float variance = 0.0f;
+  float mean = 0.0f;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    variance += std::max(0.0f, squares[lane] - sum[lane] * sum[lane] / n);
+    mean += sum[lane];
+  }
+  const float perTexel = 1.0f / (n * static_cast<float>(texels));
+  // A single sample tells nothing of its variance.
+  const float weight = n / (n + spread.samples);
+  if (samples > 1) {
+    const float unbiased = variance / ((n - 1.0f) * static_cast<float>(texels));
+    spread.variance += (unbiased - spread.variance) * weight;
+  }
+  spread.unshadowed += (unshadowed * perTexel - spread.unshadowed) * weight;
+  spread.mean += (mean * perTexel - spread.mean) * weight;
+  spread.samples += n;
+}
+
+std::uint32_t lightStretch(std::uint32_t sample) {
+  return static_cast<std::uint32_t>(std::upper_bound(kLightStretches.begin(), kLightStretches.end(), sample) -
+                                    kLightStretches.begin());
+}
+
+int lightPower(std::span<const LightSpread> all, std::size_t strategy) {
+  if (!(all[strategy].samples > 0.0f)) return 0;
+  float light = 0.0f;
+  for (const LightSpread& spread : all) light += spread.mean;
+  const float measure = std::max(deviation(all.back()), kSmoothEnough * light);
+  const float share = std::sqrt(kGatherCost) * deviation(all[strategy]) / measure;
+  if (!(share > 0.0f)) return kFewest;
+  return static_cast<int>(std::lround(std::clamp(std::log2(share), float{kFewest}, float{kMost})));
+}
+
+}  // namespace lumel

@@ -1,0 +1,102 @@
+// Next-event estimation for a wave of surface points: one shadow ray per point and kind of light that the scene has.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "baker/light/light_transport.h"
+#include "baker/rays/sample_lanes.h"
+#include "baker/rays/sampling.h"
+
+namespace lumel {
+
+/// A point that receives light; both normals on the side that light is gathered on.
+struct Receiver {
+  Vec3 p{0};
+  Vec3 ng{0, 0, 1};
+  Vec3 ns{0, 0, 1};
+  Vec3 rayStart{0};
+};
+
+/// The sample patterns that one receiver's decisions use, counted from a base.
+enum LightPattern : std::uint32_t { kPunctual, kEmitter, kEmitterPoint, kSun, kSky, kLightPatterns };
+
+/// One way to take a light sample. All that a scene needs (lightStrategies) add up to its direct light.
+struct LightStrategy {
+  enum Kind { EveryPunctual, NearPunctual, OnePunctual, Emissive, Sun, Sky };
+  Kind kind = EveryPunctual;
+  std::size_t light = 0;  // of OnePunctual
+};
+
+/// No more punctual lights than this are sampled each by itself.
+inline constexpr std::size_t kSeparateLights = 8;
+
+/// `separate`: a strategy for each punctual light, where there are few; of more, for each directional one, if these are
+/// few, and one that chooses among the rest. Else one that chooses among all.
+std::vector<LightStrategy> lightStrategies(const LightTransport& transport, bool separate);
+
+/// The receivers of a wave: those lanes that are `active`.
+struct LightLanes {
+  LaneFlags active{};
+  std::array<Receiver, kLanes> receivers;
+};
+
+/// Sends a ray from every active receiver into the hemisphere about its shading normal. Density: cosTheta / pi. Those
+/// that would go below the geometric surface are not valid.
+void aimByCosine(const ReceiverLanes& receivers, const UnitSquareLanes& u, RayPacket& packet, float* pdf);
+
+/// One light sample of every lane.
+struct SampledLight {
+  Vec3Lanes wi;     // unit, towards the light
+  Vec3Lanes light;  // radiance over density, weighed against hits; zero where nothing could arrive
+  ShadowPacket shadows;
+
+  bool found(std::size_t lane) const { return shadows.visible(static_cast<int>(lane)); }
+};
+
+/// Takes one light sample by `strategy` for every active lane. `density`: with which the receivers gather from a
+/// direction, for multiple importance sampling against hits. Samples whose shadow rays are to be traced are set in
+/// `sampled.shadows`; returns their number. `sky`: of Sky, what findSky() found for these samples, if that is known.
+std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& strategy, const ReceiverLanes& receivers,
+                        const SampleLanes& samples, std::uint32_t patternBase, const SurfaceDensity& density,
+                        SampledLight& sampled, const EnvironmentLight::Places* sky = nullptr);
+
+/// One sample by each of the strategies that the scene needs: calls add(lane, wi, radianceOverPdf) for each that is
+/// visible. Returns the number of shadow rays.
+template <class Add>
+std::uint64_t directLight(const LightTransport& transport, const ReceiverLanes& receivers, const SampleLanes& samples,
+                          std::uint32_t patternBase, TraceMode mode, const SurfaceDensity& density, Add add) {
+  std::uint64_t shadowRays = 0;
+  SampledLight sampled;
+  const auto take = [&](bool needed, LightStrategy::Kind kind) {
+    if (!needed) return;
+    const std::uint64_t rays = takeLight(transport, {kind}, receivers, samples, patternBase, density, sampled);
+    if (rays == 0) return;
+    shadowRays += rays;
+    transport.rays.occluded(sampled.shadows, mode);
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if (sampled.found(lane)) add(static_cast<int>(lane), sampled.wi[lane], sampled.light[lane]);
+  };
+  take(!transport.punctual.empty(), LightStrategy::EveryPunctual);
+  take(!transport.emissive.empty(), LightStrategy::Emissive);
+  take(transport.environment.sunSampled(), LightStrategy::Sun);
+  take(transport.environment.skySampled(), LightStrategy::Sky);
+  return shadowRays;
+}
+
+template <class Add>
+std::uint64_t directLight(const LightTransport& transport, const LightLanes& lanes, const SampleLanes& samples,
+                          std::uint32_t patternBase, TraceMode mode, const SurfaceDensity& density, Add add) {
+  Vec3Lanes p, ng, ns, rayStart;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    p.set(lane, lanes.receivers[lane].p);
+    ng.set(lane, lanes.receivers[lane].ng);
+    ns.set(lane, lanes.receivers[lane].ns);
+    rayStart.set(lane, lanes.receivers[lane].rayStart);
+  }
+  return directLight(transport, ReceiverLanes{lanes.active, p, ng, ns, rayStart}, samples, patternBase, mode, density,
+                     add);
+}
+
+}  // namespace lumel

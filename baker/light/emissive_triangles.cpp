@@ -1,0 +1,343 @@
+#include <algorithm>
+#include <array>
+
+#include "baker/light/lights.h"
+#include "baker/rays/sampling.h"
+#include "scene/base/parallel.h"
+
+namespace lumel {
+namespace {
+
+/// Points on a side of the triangular grid that a texture's emission is averaged over.
+constexpr int kEmissionGrid = 8;
+
+/// Mean luminance over a triangle of what it sends out where it is not cut out.
+float meanEmission(const Materials& materials, const Primitive& primitive, std::uint32_t triangle) {
+  const Material& material = materials.material(primitive.material);
+  const bool varies = material.emissionMap || materials.needsAlphaTest(primitive);
+  const int n = varies ? kEmissionGrid : 1;
+  double sum = 0.0;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      const Vec2 u = (Vec2(i, j) + 0.5f) / static_cast<float>(n);
+      const TrianglePoint point{&primitive, triangle, sampleTriangle(u)};
+      sum += static_cast<double>(luminance(materials.emission(point)) * materials.opacity(point));
+    }
+  return static_cast<float>(sum / (n * n));
+}
+
+[[gnu::always_inline]] inline bool bySolidAngle(float solidAngle) {
+  return (solidAngle > EmissiveTriangles::kLeastSolidAngle) & (solidAngle < EmissiveTriangles::kMostSolidAngle);
+}
+
+/// A cosine, or length, as the side of a triangle has it that p looks at: 0 from behind, unless it shines there too
+/// (back = 1; else 0).
+[[gnu::always_inline]] inline float facing(float front, float back) {
+  const float behind = -back * front;
+  return front > behind ? front : behind;
+}
+
+/// Of the corners as a point sees them, what their solid angle is made of (sampling.h); 0 from the side that does not
+/// shine. `a`: the first of them.
+[[gnu::always_inline]] inline float volumeOf(const Vec3& a, const Vec3& ng, float doubleArea, float back) {
+  return facing(-glm::dot(a, ng), back) * doubleArea;
+}
+
+/// Mean luminance times solid angle to half a percent: atan(x) is x / (1 + 0.28 x^2) within 0.005 for |x| <= 1.
+[[gnu::always_inline]] inline float importanceOf(const Vec3& a, const Vec3& e1, const Vec3& e2, float seen,
+                                                 float luminance) {
+  const float below = belowSolidAngle<Vec3, float>(a, a + e1, a + e2);
+  const float steep = std::abs(below);
+  const float volume = pick(seen > 0.0f, seen, 0.0f);
+  const bool isSmall = volume < steep;
+  const float most = pick(isSmall, steep, volume);
+  const float least = pick(isSmall, volume, steep);
+  const float small = most * least / pick(most > 0.0f, most * most + 0.28f * (least * least), 1.0f);
+  const float acute = pick(isSmall, small, 0.5f * kPi - small);
+  const float half = pick(below < 0.0f, kPi - acute, acute);
+  return pick(volume > 0.0f, 2.0f * half * luminance, 0.0f);
+}
+
+}  // namespace
+
+/// The emitters that the lanes chose, by what sampling needs of them.
+struct alignas(64) EmissiveTriangles::Chosen {
+  // As an emitter begins.
+  Vec3Lanes corner;
+  float doubleArea[kLanes] = {};
+  Vec3Lanes e1;
+  float luminance[kLanes] = {};
+  Vec3Lanes e2;
+  float back[kLanes] = {};
+  Vec3Lanes ng;
+  float offsetMeters[kLanes] = {};
+  Vec3Lanes radiance;
+
+  float probability[kLanes] = {};  // 0: nothing was chosen
+  std::uint32_t triangle[kLanes] = {};
+  // The point on each.
+  float x[kLanes];
+  float y[kLanes];
+};
+
+EmissiveTriangles::EmissiveTriangles(RayScene& rays, const Materials& materials)
+    : rays_(&rays), materials_(&materials) {
+  for (std::uint32_t p = 0; p < rays.parts().size(); ++p) {
+    ScenePart& part = rays.parts()[p];
+    if (!materials.emits(part.primitive->material)) continue;
+    part.firstEmitter = static_cast<std::int64_t>(triangles_.size());
+    for (std::uint32_t t = 0; t < part.primitive->triangleCount(); ++t)
+      triangles_.push_back({.part = p, .triangle = t});
+  }
+  std::vector<LightBounds> bounds(triangles_.size());
+  parallelFor(triangles_.size(), 256, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      Emitter& emitter = triangles_[i];
+      describe(emitter);
+      const Vec3 second = emitter.corner + emitter.e1;
+      const Vec3 third = emitter.corner + emitter.e2;
+      bounds[i].min = glm::min(emitter.corner, glm::min(second, third));
+      bounds[i].max = glm::max(emitter.corner, glm::max(second, third));
+      bounds[i].axis = emitter.ng;
+      bounds[i].cosSpread = emitter.back > 0.0f ? -1.0f : 1.0f;
+      bounds[i].power = 0.5f * emitter.doubleArea * emitter.luminance;
+    }
+  });
+  tree_ = LightTree(bounds);
+  for (const std::uint32_t triangle : tree_.onlyLeaf()) few_.push_back(triangles_[triangle]);
+  uniform_ = std::all_of(triangles_.begin(), triangles_.end(), [](const Emitter& e) { return e.uniform; });
+}
+
+void EmissiveTriangles::describe(Emitter& emitter) const {
+  const ScenePart& part = rays_->parts()[emitter.part];
+  const Material& material = materials_->material(part.primitive->material);
+  const std::array<Vec3, 3> corners = rays_->corners(part, emitter.triangle);
+  emitter.corner = corners[0];
+  emitter.e1 = corners[1] - corners[0];
+  emitter.e2 = corners[2] - corners[0];
+  const Vec3 cross = glm::cross(emitter.e1, emitter.e2);
+  emitter.doubleArea = glm::length(cross);
+  emitter.ng = glm::normalize(cross) * part.frontSign;
+  emitter.offsetMeters = offsetDistance(corners, part.translation);
+  emitter.back = material.doubleSided ? 1.0f : 0.0f;
+  emitter.uniform = !material.emissionMap && !materials_->needsAlphaTest(*part.primitive);
+  emitter.radiance = materials_->emission({part.primitive, emitter.triangle, Vec2(1.0f / 3)});
+  emitter.luminance = meanEmission(*materials_, *part.primitive, emitter.triangle);
+}
+
+Vec3 EmissiveTriangles::radianceAt(const Emitter& emitter, Vec2 barycentric) const {
+  if (emitter.uniform) return emitter.radiance;
+  const TrianglePoint point{rays_->parts()[emitter.part].primitive, emitter.triangle, barycentric};
+  return materials_->emission(point) * materials_->opacity(point);
+}
+
+float EmissiveTriangles::importance(std::uint32_t triangle, const Vec3& p) const {
+  const Emitter& e = triangles_[triangle];
+  const Vec3 a = e.corner - p;
+  return importanceOf(a, e.e1, e.e2, volumeOf(a, e.ng, e.doubleArea, e.back), e.luminance);
+}
+
+/// As LightTree::choose among the lights of a leaf.
+LUMEL_FOR_EACH_CPU void EmissiveTriangles::chooseAmongFew(std::span<const Emitter> few, const Vec3Lanes& p,
+                                                          const UnitLanes& u, Chosen& chosen) {
+  alignas(64) float each[LightTree::kLeaf][kLanes];
+  alignas(64) float total[kLanes] = {};
+  for (std::size_t k = 0; k < few.size(); ++k) {
+    const Emitter e = few[k];
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const Vec3 a = e.corner - p[lane];
+      each[k][lane] = importanceOf(a, e.e1, e.e2, volumeOf(a, e.ng, e.doubleArea, e.back), e.luminance);
+      total[lane] += each[k][lane];
+    }
+  }
+  alignas(64) float before[kLanes] = {};
+  alignas(64) float taken[kLanes] = {};
+  for (std::size_t k = 0; k < few.size(); ++k) {
+    const Emitter e = few[k];
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      // The last one that is possible, until the target is passed.
+      const bool takes = (each[k][lane] > 0.0f) & !((taken[lane] > 0.0f) & (u.u[lane] * total[lane] < before[lane]));
+      before[lane] += each[k][lane];
+      taken[lane] = pick(takes, each[k][lane], taken[lane]);
+      chosen.triangle[lane] = takes ? static_cast<std::uint32_t>(k) : chosen.triangle[lane];
+      chosen.corner.x[lane] = pick(takes, e.corner.x, chosen.corner.x[lane]);
+      chosen.corner.y[lane] = pick(takes, e.corner.y, chosen.corner.y[lane]);
+      chosen.corner.z[lane] = pick(takes, e.corner.z, chosen.corner.z[lane]);
+      chosen.e1.x[lane] = pick(takes, e.e1.x, chosen.e1.x[lane]);
+      chosen.e1.y[lane] = pick(takes, e.e1.y, chosen.e1.y[lane]);
+      chosen.e1.z[lane] = pick(takes, e.e1.z, chosen.e1.z[lane]);
+      chosen.e2.x[lane] = pick(takes, e.e2.x, chosen.e2.x[lane]);
+      chosen.e2.y[lane] = pick(takes, e.e2.y, chosen.e2.y[lane]);
+      chosen.e2.z[lane] = pick(takes, e.e2.z, chosen.e2.z[lane]);
+      chosen.ng.x[lane] = pick(takes, e.ng.x, chosen.ng.x[lane]);
+      chosen.ng.y[lane] = pick(takes, e.ng.y, chosen.ng.y[lane]);
+      chosen.ng.z[lane] = pick(takes, e.ng.z, chosen.ng.z[lane]);
+      chosen.radiance.x[lane] = pick(takes, e.radiance.x, chosen.radiance.x[lane]);
+      chosen.radiance.y[lane] = pick(takes, e.radiance.y, chosen.radiance.y[lane]);
+      chosen.radiance.z[lane] = pick(takes, e.radiance.z, chosen.radiance.z[lane]);
+      chosen.doubleArea[lane] = pick(takes, e.doubleArea, chosen.doubleArea[lane]);
+      chosen.offsetMeters[lane] = pick(takes, e.offsetMeters, chosen.offsetMeters[lane]);
+      chosen.back[lane] = pick(takes, e.back, chosen.back[lane]);
+    }
+  }
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    chosen.probability[lane] = taken[lane] / pick(total[lane] > 0.0f, total[lane], 1.0f);
+}
+
+/// The same among the lights of each lane's leaf.
+LUMEL_FOR_EACH_CPU void EmissiveTriangles::chooseInLeaves(const Emitter* triangles,
+                                                          const std::array<LaneFlags, LightTree::kLeaf>& lights,
+                                                          const LightTree::Descent& descent, const Vec3Lanes& p,
+                                                          Chosen& chosen) {
+  LaneFlags at;
+  alignas(64) float each[LightTree::kLeaf][kLanes];
+  alignas(64) float total[kLanes] = {};
+  for (std::size_t k = 0; k < LightTree::kLeaf; ++k) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) at[lane] = lights[k][lane] < 0 ? 0 : lights[k][lane];
+    turnRecords(triangles, at, &chosen);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const Vec3 a = chosen.corner[lane] - p[lane];
+      const float seen = volumeOf(a, chosen.ng[lane], chosen.doubleArea[lane], chosen.back[lane]);
+      const float importance = importanceOf(a, chosen.e1[lane], chosen.e2[lane], seen, chosen.luminance[lane]);
+      each[k][lane] = pick(lights[k][lane] >= 0, importance, 0.0f);
+      total[lane] += each[k][lane];
+    }
+  }
+  alignas(64) float before[kLanes] = {};
+  alignas(64) float taken[kLanes] = {};
+  at.fill(0);
+  for (std::size_t k = 0; k < LightTree::kLeaf; ++k)
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const float target = static_cast<float>(descent.rest[lane]) * total[lane];
+      const bool takes = (each[k][lane] > 0.0f) & !((taken[lane] > 0.0f) & (target < before[lane]));
+      before[lane] += each[k][lane];
+      taken[lane] = pick(takes, each[k][lane], taken[lane]);
+      at[lane] = takes ? lights[k][lane] : at[lane];
+    }
+  turnRecords(triangles, at, &chosen);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const float share = taken[lane] / pick(total[lane] > 0.0f, total[lane], 1.0f);
+    chosen.probability[lane] = descent.probability[lane] * share;
+    chosen.triangle[lane] = static_cast<std::uint32_t>(at[lane]);
+  }
+}
+
+/// Points on the chosen triangles, and what they send to p.
+LUMEL_FOR_EACH_CPU void EmissiveTriangles::samplePoints(const Vec3Lanes& p, const UnitSquareLanes& u, Chosen& chosen,
+                                                        LightSampleLanes& samples) {
+#pragma GCC ivdep
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Vec3 e1 = chosen.e1[lane], e2 = chosen.e2[lane];
+    const float back = chosen.back[lane];
+    const Vec3 a = chosen.corner[lane] - p[lane];
+    const Vec3 b = a + e1, c = a + e2;
+    const float volume = volumeOf(a, chosen.ng[lane], chosen.doubleArea[lane], back);
+    // (That of a triangle seen from its edge is 0 or a full sphere: neither is sampled so, or shines.)
+    const float solidAngle = 2.0f * angleAbove(volume, belowSolidAngle<Vec3, float>(a, b, c));
+    const bool round = bySolidAngle(solidAngle);
+
+    const float perA = 1.0f / glm::length(a), perB = 1.0f / glm::length(b), perC = 1.0f / glm::length(c);
+    const SphericalTriangleOf<float> sphere{a * perA, b * perB, c * perC};
+    const Vec3 towards = sphere.sample({u.x[lane], u.y[lane]}, solidAngle, volume * perA * perB * perC);
+    // Where the direction meets the triangle (Moeller and Trumbore 1997).
+    const Vec3 across = glm::cross(towards, e2);
+    const float below = glm::dot(e1, across);
+    const float perBelow = 1.0f / pick(below != 0.0f, below, 1.0f);
+    const float first = within(-glm::dot(a, across) * perBelow, 0.0f, 1.0f);
+    const float second = within(-glm::dot(towards, glm::cross(a, e1)) * perBelow, 0.0f, 1.0f - first);
+
+    const Vec2 flat = sampleTriangle({u.x[lane], u.y[lane]});
+    const float x = pick(round, pick(below != 0.0f, first, 1.0f / 3), flat.x);
+    const float y = pick(round, pick(below != 0.0f, second, 1.0f / 3), flat.y);
+    chosen.x[lane] = x;
+    chosen.y[lane] = y;
+
+    const Vec3 toLight = a + x * e1 + y * e2;
+    const float distance2 = glm::dot(toLight, toLight);
+    const float perDistance = 1.0f / std::sqrt(pick(distance2 > 0.0f, distance2, 1.0f));
+    const Vec3 wi = toLight * perDistance;
+    const float cosFront = -glm::dot(wi, chosen.ng[lane]);
+    const float side = pick(cosFront < 0.0f, 1.0f - 2.0f * back, 1.0f);
+    const float cosLight = facing(cosFront, back);
+    const float choice = chosen.probability[lane];
+    const bool shines = (distance2 > 0.0f) & (cosLight > 0.0f) & (choice > 0.0f);
+    const float density = pick(round, 1.0f / solidAngle, 2.0f * distance2 / (chosen.doubleArea[lane] * cosLight));
+    const float pdf = pick(shines, choice * density, 0.0f);
+    const float perPdf = pick(shines, 1.0f / pdf, 0.0f);
+    const float away = side * chosen.offsetMeters[lane];
+    samples.pdf[lane] = pdf;
+    samples.distant[lane] = 0;
+    samples.wi.x[lane] = wi.x;
+    samples.wi.y[lane] = wi.y;
+    samples.wi.z[lane] = wi.z;
+    samples.weight.x[lane] = chosen.radiance.x[lane] * perPdf;
+    samples.weight.y[lane] = chosen.radiance.y[lane] * perPdf;
+    samples.weight.z[lane] = chosen.radiance.z[lane] * perPdf;
+    samples.target.x[lane] = chosen.corner.x[lane] + x * e1.x + y * e2.x + away * chosen.ng.x[lane];
+    samples.target.y[lane] = chosen.corner.y[lane] + x * e1.y + y * e2.y + away * chosen.ng.y[lane];
+    samples.target.z[lane] = chosen.corner.z[lane] + x * e1.z + y * e2.z + away * chosen.ng.z[lane];
+  }
+}
+
+void EmissiveTriangles::sample(const Vec3Lanes& p, const LaneFlags& active, const UnitLanes& uTriangle,
+                               const UnitSquareLanes& uPoint, LightSampleLanes& samples) const {
+  Chosen chosen;
+  if (!few_.empty()) {
+    chooseAmongFew(few_, p, uTriangle, chosen);
+  } else {
+    LightTree::Descent descent;
+    tree_.descend(p, nullptr, active, uTriangle.u, descent);
+    std::array<LaneFlags, LightTree::kLeaf> lights;
+    tree_.lightsOf(descent, lights);
+    chooseInLeaves(triangles_.data(), lights, descent, p, chosen);
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      chosen.radiance.set(lane, triangles_[chosen.triangle[lane]].radiance);
+  }
+  samplePoints(p, uPoint, chosen, samples);
+  if (uniform_) return;
+  const std::vector<Emitter>& from = few_.empty() ? triangles_ : few_;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Emitter& emitter = from[chosen.triangle[lane]];
+    if (!emitter.uniform && samples.pdf[lane] > 0.0f)
+      samples.weight.set(lane, radianceAt(emitter, {chosen.x[lane], chosen.y[lane]}) / samples.pdf[lane]);
+  }
+}
+
+LightSample EmissiveTriangles::sample(const Vec3& p, float uTriangle, Vec2 uPoint) const {
+  Vec3Lanes points;
+  points.set(0, p);
+  UnitLanes choice{};
+  choice.u[0] = uTriangle;
+  UnitSquareLanes place{};
+  place.x[0] = uPoint.x;
+  place.y[0] = uPoint.y;
+  LightSampleLanes samples;
+  sample(points, {1}, choice, place, samples);
+  return {samples.wi[0], samples.weight[0], samples.pdf[0], false, samples.target[0]};
+}
+
+float EmissiveTriangles::pdf(const HitSurface& hit, const Vec3& origin) const {
+  const std::int64_t first = rays_->parts()[hit.part].firstEmitter;
+  if (first < 0) return 0.0f;
+  const auto light = static_cast<std::uint32_t>(first) + hit.point.triangle;
+  const float probability =
+      tree_.probability({origin}, light, [&](std::uint32_t triangle) { return importance(triangle, origin); });
+  if (!(probability > 0.0f)) return 0.0f;
+  const Emitter& emitter = triangles_[light];
+  const Vec3 a = emitter.corner - origin;
+  const float angle =
+      triangleSolidAngle(a, a + emitter.e1, a + emitter.e2, volumeOf(a, emitter.ng, emitter.doubleArea, emitter.back));
+  if (bySolidAngle(angle)) return probability / angle;
+  const Vec3 toLight = hit.p - origin;
+  const float distance2 = glm::dot(toLight, toLight);
+  const float cosLight = std::abs(glm::dot(toLight, hit.ng)) / std::sqrt(distance2);
+  return 2.0f * probability * distance2 / (emitter.doubleArea * cosLight);
+}
+
+Vec3 emittedTowardsRay(const Materials& materials, const HitSurface& hit) {
+  if (!materials.emits(hit.material)) return Vec3(0.0f);
+  if (hit.backFace && !materials.material(hit.material).doubleSided) return Vec3(0.0f);
+  return materials.emission(hit.point);
+}
+
+}  // namespace lumel

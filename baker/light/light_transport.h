@@ -1,0 +1,24 @@
+// Everything that light meets on its way through a scene, as the integrators see it.
+#pragma once
+
+#include "baker/light/environment_light.h"
+#include "baker/light/lights.h"
+#include "baker/rays/materials.h"
+#include "baker/rays/ray_scene.h"
+
+namespace lumel {
+
+/// What the scene lacks is empty and costs nothing.
+struct LightTransport {
+  const RayScene& rays;
+  const Materials& materials;
+  const PunctualLights& punctual;
+  const EmissiveTriangles& emissive;
+  const EnvironmentLight& environment;
+
+  /// Whether a ray can bring light back by itself, by what it hits or by leaving the scene.
+  bool raysSeeLight() const { return !emissive.empty() || environment.shines(); }
+  bool dark() const { return !raysSeeLight() && punctual.empty(); }
+};
+
+}  // namespace lumel

@@ -1,0 +1,283 @@
+#include "baker/light/lights.h"
+
+#include <algorithm>
+#include <array>
+
+#include "baker/rays/sampling.h"
+
+namespace lumel {
+namespace {
+
+/// Radians that a spot's cone is taken for wider, for rounding.
+constexpr float kConeSlack = 0.02f;
+
+bool sends(const Light& light) {
+  return light.intensity > 0.0f && std::max({light.color.x, light.color.y, light.color.z}) > 0.0f;
+}
+
+/// Of a light with a position.
+LightBounds boundsOf(const Light& light) {
+  LightBounds bounds{.min = light.position, .max = light.position, .cosSpread = -1.0f, .cosEmit = 0.0f};
+  bounds.power = luminance(light.color) * light.intensity;
+  if (light.range > 0.0f) bounds.reach = light.range;
+  if (light.type == LightType::Spot) {
+    // All directions inside of its cone count alike, and those outside not at all.
+    bounds.axis = light.direction;
+    bounds.cosSpread = std::cos(light.outerConeAngle);
+    bounds.cosEmit = std::cos(kConeSlack);
+  }
+  return bounds;
+}
+
+/// Irradiance per power: one over the square of the distance, with the range's window and the cone; nothing at the
+/// light itself.
+[[gnu::always_inline]] inline float attenuation(const Vec3& p, const Vec3& position, const Vec3& direction,
+                                                float perRange2, float cosOuter, float perCone, Vec3& wi) {
+  const Vec3 toLight = position - p;
+  const float distance2 = glm::dot(toLight, toLight);
+  const bool apart = distance2 > 0.0f;
+  const float perDistance = 1.0f / std::sqrt(pick(apart, distance2, 1.0f));
+  wi = toLight * perDistance;
+  const float share = distance2 * perRange2;
+  const float window = within(1.0f - share * share, 0.0f, 1.0f);
+  const float cone = within((-glm::dot(direction, wi) - cosOuter) * perCone, 0.0f, 1.0f);
+  return pick(apart, window * (cone * cone) * (perDistance * perDistance), 0.0f);
+}
+
+[[gnu::always_inline]] inline Vec3 facingNearby(const PunctualLights::Source& light, const Vec3& p, Vec3& wi) {
+  return light.power *
+         attenuation(p, light.position, light.direction, light.perRange2, light.cosOuter, light.perCone, wi);
+}
+
+/// For the choice.
+[[gnu::always_inline]] inline float importanceOf(const Vec3& facing, const Vec3& wi, const Vec3& n) {
+  const float cosTheta = glm::dot(wi, n);
+  return pick(cosTheta > 0.0f, luminance(facing) * (1.0f + 2.0f * cosTheta), 0.0f);
+}
+
+/// Sampled light of one source with a position, for all lanes.
+LUMEL_FOR_EACH_CPU void sampleNearby(const PunctualLights::Source& light, const Vec3Lanes& p,
+                                     LightSampleLanes& samples) {
+  const PunctualLights::Source from = light;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    Vec3 wi;
+    const Vec3 facing = facingNearby(from, p[lane], wi);
+    samples.wi.x[lane] = wi.x;
+    samples.wi.y[lane] = wi.y;
+    samples.wi.z[lane] = wi.z;
+    samples.weight.x[lane] = facing.x;
+    samples.weight.y[lane] = facing.y;
+    samples.weight.z[lane] = facing.z;
+    samples.target.x[lane] = from.position.x;
+    samples.target.y[lane] = from.position.y;
+    samples.target.z[lane] = from.position.z;
+    samples.pdf[lane] = 0.0f;
+    samples.distant[lane] = 0;
+  }
+}
+
+}  // namespace
+
+PunctualLights::Source::Source(const Light& light)
+    : distant(light.type == LightType::Directional),
+      power(light.color * light.intensity),
+      position(light.position),
+      direction(light.direction) {
+  if (light.range > 0.0f) perRange2 = 1.0f / (light.range * light.range);
+  if (light.type != LightType::Spot) return;
+  cosOuter = std::cos(light.outerConeAngle);
+  perCone = 1.0f / std::max(0.001f, std::cos(light.innerConeAngle) - cosOuter);
+}
+
+Vec3 PunctualLights::Source::facing(const Vec3& p, Vec3& wi) const {
+  if (!distant) return facingNearby(*this, p, wi);
+  wi = -direction;
+  return power;
+}
+
+Vec3 facingIrradiance(const Light& light, const Vec3& p, Vec3& wi) {
+  return PunctualLights::Source(light).facing(p, wi);
+}
+
+PunctualLights::PunctualLights(const std::vector<Light>& lights) {
+  for (const bool directional : {true, false}) {
+    for (const Light& light : lights)
+      if (sends(light) && (light.type == LightType::Directional) == directional) lights_.emplace_back(light);
+    if (directional) directional_ = lights_.size();
+  }
+  if (lights_.size() - directional_ <= kLocalLights) return;
+  std::vector<LightBounds> bounds(lights_.size());  // those of directional lights stay without power
+  std::size_t i = directional_;
+  for (const Light& light : lights)
+    if (light.type != LightType::Directional && sends(light)) bounds[i++] = boundsOf(light);
+  tree_ = LightTree(bounds);
+}
+
+LightSample PunctualLights::sampleOne(std::size_t index, const Vec3& p) const {
+  LightSample sample;
+  sample.weight = lights_[index].facing(p, sample.wi);
+  sample.distant = lights_[index].distant;
+  sample.target = lights_[index].position;
+  return sample;
+}
+
+void PunctualLights::sampleOne(std::size_t index, const Vec3Lanes& p, LightSampleLanes& samples) const {
+  if (!lights_[index].distant) return sampleNearby(lights_[index], p, samples);
+  const LightSample sample = sampleOne(index, Vec3(0.0f));
+  for (std::size_t lane = 0; lane < kLanes; ++lane) samples.set(lane, sample);
+}
+
+float PunctualLights::importance(std::size_t light, const Vec3& p, const Vec3& n) const {
+  Vec3 wi;
+  const Vec3 facing = lights_[light].facing(p, wi);
+  return importanceOf(facing, wi, n);
+}
+
+LightTree::Choice PunctualLights::chooseOne(std::size_t first, const Vec3& p, const Vec3& n, float u) const {
+  if (tree_.empty()) return chooseAmong(first, lights_.size(), 0.0f, p, n, u);
+  if (first == directional_) return chooseAmong(first, first, 1.0f, p, n, u);
+  return chooseAmong(first, directional_, tree_.importance({p, n}), p, n, u);
+}
+
+LightSample PunctualLights::choose(std::size_t first, const Vec3& p, const Vec3& n, float u) const {
+  const LightTree::Choice choice = chooseOne(first, p, n, u);
+  if (!(choice.probability > 0.0f)) return {};
+  LightSample sample = sampleOne(choice.light, p);
+  sample.weight /= choice.probability;
+  return sample;
+}
+
+/// What sampling needs of the chosen lights.
+struct alignas(64) PunctualLights::Chosen {
+  Vec3Lanes power, position, direction;
+  float perRange2[kLanes];
+  float cosOuter[kLanes];
+  float perCone[kLanes];
+  int distant[kLanes];
+  int light[kLanes] = {};
+  float probability[kLanes] = {};  // 0: nothing was chosen
+
+  void set(std::size_t lane, const Source& source) {
+    power.set(lane, source.power);
+    position.set(lane, source.position);
+    direction.set(lane, source.direction);
+    perRange2[lane] = source.perRange2;
+    cosOuter[lane] = source.cosOuter;
+    perCone[lane] = source.perCone;
+    distant[lane] = source.distant ? 1 : 0;
+  }
+};
+
+/// As chooseAmong.
+LUMEL_FOR_EACH_CPU void PunctualLights::chooseAmongFew(std::span<const Source> few, const ReceiverLanes& at,
+                                                       const UnitLanes& u, Chosen& chosen) {
+  alignas(64) float each[kLocalLights][kLanes];
+  alignas(64) float total[kLanes] = {};
+  for (std::size_t k = 0; k < few.size(); ++k) {
+    const Source light = few[k];
+    if (light.distant) {
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        each[k][lane] = importanceOf(light.power, -light.direction, at.ns[lane]);
+    } else {
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        Vec3 wi;
+        const Vec3 facing = facingNearby(light, at.p[lane], wi);
+        each[k][lane] = importanceOf(facing, wi, at.ns[lane]);
+      }
+    }
+    for (std::size_t lane = 0; lane < kLanes; ++lane) total[lane] += each[k][lane];
+  }
+  alignas(64) float before[kLanes] = {};
+  alignas(64) float taken[kLanes] = {};
+  for (std::size_t k = 0; k < few.size(); ++k) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      // The last one that is possible, until the target is passed.
+      const bool takes = (each[k][lane] > 0.0f) & !((taken[lane] > 0.0f) & (u.u[lane] * total[lane] < before[lane]));
+      before[lane] += each[k][lane];
+      taken[lane] = pick(takes, each[k][lane], taken[lane]);
+      chosen.light[lane] = takes ? static_cast<int>(k) : chosen.light[lane];
+    }
+  }
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    chosen.probability[lane] = taken[lane] / pick(total[lane] > 0.0f, total[lane], 1.0f);
+}
+
+LUMEL_FOR_EACH_CPU void PunctualLights::sampleChosen(const Chosen& chosen, const Vec3Lanes& p,
+                                                     LightSampleLanes& samples) {
+#pragma GCC ivdep
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    Vec3 wi;
+    const Vec3 power = chosen.power[lane], direction = chosen.direction[lane];
+    const float nearby = attenuation(p[lane], chosen.position[lane], direction, chosen.perRange2[lane],
+                                     chosen.cosOuter[lane], chosen.perCone[lane], wi);
+    const bool distant = chosen.distant[lane] != 0;
+    const bool any = chosen.probability[lane] > 0.0f;
+    const float probability = pick(any, chosen.probability[lane], 1.0f);
+    const float arriving = pick(any, pick(distant, 1.0f, nearby), 0.0f);
+    samples.wi.x[lane] = pick(distant, -direction.x, wi.x);
+    samples.wi.y[lane] = pick(distant, -direction.y, wi.y);
+    samples.wi.z[lane] = pick(distant, -direction.z, wi.z);
+    samples.weight.x[lane] = power.x * arriving / probability;
+    samples.weight.y[lane] = power.y * arriving / probability;
+    samples.weight.z[lane] = power.z * arriving / probability;
+    samples.target.x[lane] = chosen.position.x[lane];
+    samples.target.y[lane] = chosen.position.y[lane];
+    samples.target.z[lane] = chosen.position.z[lane];
+    samples.pdf[lane] = 0.0f;
+    samples.distant[lane] = chosen.distant[lane];
+  }
+}
+
+void PunctualLights::choose(std::size_t first, const ReceiverLanes& at, const UnitLanes& u,
+                            LightSampleLanes& samples) const {
+  Chosen chosen;
+  if (tree_.empty() && lights_.size() - first <= kLocalLights) {
+    chooseAmongFew(std::span(lights_).subspan(first), at, u, chosen);
+    for (int& light : chosen.light) light += static_cast<int>(first);
+  } else {
+    LightTree::Descent descent;
+    const bool byTree = !tree_.empty() && first == directional_;
+    if (byTree) tree_.descend(at.p, &at.ns, at.active, u.u, descent);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      if (!at.active[lane]) continue;
+      const Vec3 p = at.p[lane], n = at.ns[lane];
+      const LightTree::Choice choice =
+          byTree ? tree_.chooseInLeaf(descent, lane, [&](std::uint32_t light) { return importance(light, p, n); })
+                 : chooseOne(first, p, n, u.u[lane]);
+      chosen.light[lane] = static_cast<int>(choice.light);
+      chosen.probability[lane] = choice.probability;
+    }
+  }
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    chosen.set(lane, lights_[static_cast<std::size_t>(chosen.light[lane])]);
+  sampleChosen(chosen, at.p, samples);
+}
+
+/// Among lights [first, end) and, if it has any importance, the tree.
+LightTree::Choice PunctualLights::chooseAmong(std::size_t first, std::size_t end, float treeImportance, const Vec3& p,
+                                              const Vec3& n, float u) const {
+  std::array<float, kLocalLights> few;
+  std::vector<float> many;  // more directional lights than that are possible, if unlikely
+  if (end - first > few.size()) many.resize(end - first);
+  float* const importances = many.empty() ? few.data() : many.data();
+  float total = treeImportance;
+  for (std::size_t i = first; i < end; ++i) total += importances[i - first] = importance(i, p, n);
+  if (!(total > 0.0f)) return {};
+  const float threshold = u * total;
+  float before = 0.0f;
+  std::size_t chosen = end;
+  for (std::size_t i = first; i < end; ++i) {
+    if (!(importances[i - first] > 0.0f)) continue;
+    chosen = i;
+    before += importances[i - first];
+    if (threshold < before) break;
+  }
+  if (chosen < end && (threshold < before || !(treeImportance > 0.0f)))
+    return {static_cast<std::uint32_t>(chosen), importances[chosen - first] / total};
+  const float rest = std::clamp((threshold - before) / treeImportance, 0.0f, 0x1.fffffep-1f);
+  LightTree::Choice choice = tree_.choose({p, n}, rest, [&](std::uint32_t light) { return importance(light, p, n); });
+  choice.probability *= treeImportance / total;
+  return choice;
+}
+
+}  // namespace lumel

@@ -1,0 +1,300 @@
+#include "baker/path/path_integrator.h"
+
+#include <algorithm>
+
+#include "baker/light/direct_light.h"
+#include "baker/rays/sampling.h"
+#include "baker/rays/stratified_net.h"
+
+namespace lumel {
+namespace {
+
+/// Bounces after which paths may end by Russian roulette.
+constexpr int kRouletteAfter = 4;
+
+/// Sample patterns of a texel: the first receiver's, then a block for every hit.
+constexpr std::uint32_t kFootprint = kLightPatterns;
+constexpr std::uint32_t kDirection = kLightPatterns + 1;
+constexpr std::uint32_t kRoulette = kLightPatterns + 2;
+constexpr std::uint32_t kPatternsPerReceiver = kLightPatterns + 4;
+
+/// The state of one sample's path in one lane.
+struct Path {
+  Frame frame;            // of the texel's point
+  Vec3 gatherTangent{0};  // direction of the gather ray
+  float gatherPdf = 0.0f;
+  Vec3 beta{0};      // throughput from the gather ray's start
+  Vec3 radiance{0};  // what the gather ray has brought back so far
+  Vec3 origin{0};    // of the ray in flight: the surface point, before its offset
+  float pdf = 0.0f;  // density of the ray in flight's direction
+  SampleValue value;
+  std::array<Vec3, kProbeNormals> probes{};
+};
+
+class WaveTracer {
+ public:
+  WaveTracer(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas, const PathOptions& options)
+      : transport_(transport), kernels_(kernels), atlas_(atlas), options_(options) {}
+
+  WaveResult run(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count);
+
+ private:
+  void startTexels(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count);
+  void startSample();
+  void lightTexels();
+  void followPaths();
+  void findHits(int depth);
+  bool shadeHit(int lane, int depth);
+  void endDarkPaths(int depth);
+  bool scatter(int depth);
+  void launch(int lane, const Receiver& receiver, const Vec3& dirWorld, float pdf);
+  void addLight(int lane, const Vec3& dirTangent, const Vec3& radianceOverPdf);
+  void finishSample();
+  Receiver receiverAt(const SurfacePoint& point) const;
+  /// Whether what shines by itself does not count for a ray.
+  bool leavesOut(int depth) const { return depth == 0 && options_.indirectOnly; }
+
+  const LightTransport& transport_;
+  const RnmKernels& kernels_;
+  const Atlas& atlas_;
+  const PathOptions& options_;
+
+  std::uint32_t page_ = 0;
+  std::array<TexelCoord, kLanes> coords_;
+  std::array<TexelFootprint, kLanes> footprints_;
+  std::array<bool, kLanes> covered_{};
+  LightLanes lanes_;  // receivers of the light that is sampled next
+  std::array<Path, kLanes> paths_;
+  std::array<TexelSampler, kLanes> samplers_;
+  SampleLanes samples_;
+  NetLanes net_;
+  RayPacket rays_;
+  std::array<HitSurface, kLanes> hits_;
+  WaveResult result_;
+};
+
+WaveResult WaveTracer::run(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count) {
+  startTexels(pageIndex, page, first, count);
+  const auto samples = static_cast<std::uint32_t>(options_.samples);
+  for (std::uint32_t begin = 0; begin < samples;) {
+    const NetRange range = netAt(begin, samples);
+    if (options_.stratumOrder) net_.fill(samplers_, covered_, range, kDirection);
+    for (std::uint32_t step = 0; step < range.count(); ++step) {
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        samples_.setSample(static_cast<int>(lane), options_.stratumOrder ? net_.sample(step, lane) : begin + step);
+      startSample();
+      if (!options_.indirectOnly) lightTexels();
+      followPaths();
+      finishSample();
+    }
+    begin += range.count();
+  }
+  return std::move(result_);
+}
+
+void WaveTracer::startTexels(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count) {
+  page_ = pageIndex;
+  for (std::size_t lane = 0; lane < count; ++lane) {
+    coords_[lane] = page.coords[first + lane];
+    const double area = footprints_[lane].clip(atlas_, page, first + lane);
+    TexelResult& texel = result_.texels[lane];
+    texel.coverage = static_cast<float>(std::min(area, 1.0));
+    texel.probed = (first + lane) % kProbeStride == 0;
+    covered_[lane] = area > 0.0;
+    samplers_[lane] = TexelSampler(options_.seed, pageIndex, coords_[lane].x, coords_[lane].y);
+    samples_.setTexel(static_cast<int>(lane), samplers_[lane]);
+  }
+}
+
+/// As WavePoints draws them.
+Receiver WaveTracer::receiverAt(const SurfacePoint& point) const {
+  const Surface& surface = atlas_.surfaces[point.triangle.surface];
+  const std::uint32_t* corner = surface.indices.data() + std::size_t{3} * point.triangle.triangle;
+  std::array<Vec3, 3> corners, normals;
+  for (std::size_t i = 0; i < 3; ++i) {
+    corners[i] = surface.positions[corner[i]];
+    normals[i] = surface.normals[corner[i]];
+  }
+  const float translation = transport_.rays.translationOf(surface.instance);
+  Receiver receiver{point.position, point.geometricNormal, point.frame.n,
+                    offsetPoint(point.position, point.geometricNormal, corners, translation)};
+  const Vec3 e1 = corners[1] - corners[0], e2 = corners[2] - corners[0];
+  if (!isRounded(receiver.ng, e1, e2, normals)) return receiver;
+  const Vec3 lift =
+      liftToRound(point.position - corners[0], e1, e2, {point.barycentric.y, point.barycentric.z}, normals);
+  if (!(glm::dot(lift, receiver.ng) > offsetDistance(corners, translation))) return receiver;
+  receiver.rayStart += lift;
+  receiver.ng = receiver.ns;
+  return receiver;
+}
+
+void WaveTracer::startSample() {
+  rays_.clear();
+  const UnitSquareLanes footprint = samples_.draw2D(kFootprint);
+  const UnitSquareLanes direction = samples_.draw2D(kDirection);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    lanes_.active[lane] = covered_[lane];
+    if (!covered_[lane]) continue;
+    const SurfacePoint point = footprints_[lane].sample(footprint[static_cast<int>(lane)]);
+    Path& path = paths_[lane];
+    path = Path{};
+    path.frame = point.frame;
+    Receiver& receiver = lanes_.receivers[lane];
+    receiver = receiverAt(point);
+    path.gatherTangent = sampleGatherHemisphere(direction[static_cast<int>(lane)]);
+    path.gatherPdf = gatherHemispherePdf(path.gatherTangent.z);
+    const Vec3 dirWorld = path.frame.fromLocal(path.gatherTangent);
+    // A bent shading normal gathers from below the surface too, where nothing arrives.
+    if (glm::dot(dirWorld, receiver.ng) > 0.0f) launch(static_cast<int>(lane), receiver, dirWorld, path.gatherPdf);
+    path.beta = Vec3(1.0f);
+  }
+}
+
+void WaveTracer::launch(int lane, const Receiver& receiver, const Vec3& dirWorld, float pdf) {
+  Path& path = paths_[static_cast<std::size_t>(lane)];
+  path.origin = receiver.p;
+  path.pdf = pdf;
+  rays_.set(lane, receiver.rayStart, dirWorld);
+  ++result_.rays;
+}
+
+void WaveTracer::addLight(int lane, const Vec3& dirTangent, const Vec3& radianceOverPdf) {
+  const auto l = static_cast<std::size_t>(lane);
+  Path& path = paths_[l];
+  const Vec3 light = radianceOverPdf * kInvPi;
+  const Vec3 kernels = kernels_(dirTangent);
+  path.value.flat += light * std::max(0.0f, dirTangent.z);
+  for (int i = 0; i < 3; ++i) path.value.rnm[static_cast<std::size_t>(i)] += light * kernels[i];
+  if (result_.texels[l].probed)
+    for (std::size_t i = 0; i < kProbeNormals; ++i)
+      path.probes[i] += light * std::max(0.0f, glm::dot(dirTangent, probeNormals()[i]));
+}
+
+void WaveTracer::lightTexels() {
+  result_.shadowRays += directLight(transport_, lanes_, samples_, 0, options_.gatherMode, kGatherDensity,
+                                    [&](int lane, const Vec3& wi, const Vec3& light) {
+                                      addLight(lane, paths_[static_cast<std::size_t>(lane)].frame.toLocal(wi), light);
+                                    });
+}
+
+void WaveTracer::followPaths() {
+  for (int depth = 0;; ++depth) {
+    transport_.rays.intersect(rays_, depth == 0 ? options_.gatherMode : options_.bounceMode);
+    findHits(depth);
+    for (int lane = 0; lane < kLanes; ++lane)
+      lanes_.active[static_cast<std::size_t>(lane)] = rays_.valid[lane] != 0 && shadeHit(lane, depth);
+    if (depth >= kRouletteAfter) endDarkPaths(depth);
+    if (std::none_of(lanes_.active.begin(), lanes_.active.end(), [](bool active) { return active; })) break;
+    const std::uint32_t pattern = static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver;
+    result_.shadowRays += directLight(transport_, lanes_, samples_, pattern, options_.bounceMode, kCosineDensity,
+                                      [&](int lane, const Vec3& wi, const Vec3& light) {
+                                        Path& path = paths_[static_cast<std::size_t>(lane)];
+                                        const float cosTheta =
+                                            glm::dot(wi, lanes_.receivers[static_cast<std::size_t>(lane)].ns);
+                                        path.radiance += path.beta * light * (cosTheta * kInvPi);
+                                      });
+    // The last ray of a path only looks for what shines by itself.
+    if (depth + 1 == options_.bounces && !transport_.raysSeeLight()) break;
+    if (!scatter(depth)) break;
+  }
+}
+
+/// Looks up the surfaces that the lanes' rays hit before any is shaded, so that the lanes wait for memory together.
+void WaveTracer::findHits(int depth) {
+  for (int lane = 0; lane < kLanes; ++lane)
+    if (rays_.hit(lane)) hits_[static_cast<std::size_t>(lane)] = transport_.rays.surfaceAt(rays_, lane);
+  if (depth == options_.bounces) return;
+  for (int lane = 0; lane < kLanes; ++lane)
+    if (rays_.hit(lane)) transport_.materials.findAlbedo(hits_[static_cast<std::size_t>(lane)].point).prefetch();
+}
+
+/// What the ray in flight found: adds what shines by itself. Returns whether the path goes on from there; then
+/// lanes_.receivers holds the point and beta its albedo.
+bool WaveTracer::shadeHit(int lane, int depth) {
+  const auto l = static_cast<std::size_t>(lane);
+  Path& path = paths_[l];
+  if (!rays_.hit(lane)) {
+    if (depth == 0) result_.texels[l].sums.countGatherRay(false);
+    if (!transport_.environment.shines() || leavesOut(depth)) return false;
+    path.radiance += path.beta * transport_.environment.arriving(rays_.direction(lane), path.pdf);
+    return false;
+  }
+  const HitSurface& hit = hits_[l];
+  if (depth == 0)
+    result_.texels[l].sums.countGatherRay(hit.backFace && !transport_.materials.material(hit.material).doubleSided);
+  const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
+  if (emitted != Vec3(0.0f) && !leavesOut(depth))
+    path.radiance += path.beta * emitted * misWeight(path.pdf, transport_.emissive.pdf(hit, path.origin));
+  if (depth == options_.bounces) return false;
+  path.beta *= transport_.materials.albedo(hit.point);
+  if (path.beta == Vec3(0.0f)) return false;
+  lanes_.receivers[l] = {hit.p, hit.ng, transport_.rays.shadingNormal(hit), transport_.rays.rayStart(hit)};
+  return true;
+}
+
+/// Russian roulette: a path that goes on speaks for those that ended.
+void WaveTracer::endDarkPaths(int depth) {
+  const UnitLanes roulette = samples_.draw1D(static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver + kRoulette);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!lanes_.active[lane]) continue;
+    Vec3& beta = paths_[lane].beta;
+    const float survival = std::clamp(std::max({beta.x, beta.y, beta.z}), 0.05f, 1.0f);
+    lanes_.active[lane] = roulette.u[lane] < survival;
+    beta /= survival;
+  }
+}
+
+/// Sends the active lanes' paths on by the cosine; returns whether any ray is in flight.
+bool WaveTracer::scatter(int depth) {
+  rays_.clear();
+  const UnitSquareLanes direction =
+      samples_.draw2D(static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver + kDirection);
+  bool any = false;
+  for (int lane = 0; lane < kLanes; ++lane) {
+    if (!lanes_.active[static_cast<std::size_t>(lane)]) continue;
+    const Receiver& receiver = lanes_.receivers[static_cast<std::size_t>(lane)];
+    const Vec3 local = sampleCosineHemisphere(direction[lane]);
+    const Vec3 dirWorld = frameAround(receiver.ns).fromLocal(local);
+    if (!(glm::dot(dirWorld, receiver.ng) > 0.0f)) continue;
+    launch(lane, receiver, dirWorld, cosineHemispherePdf(local.z));
+    any = true;
+  }
+  return any;
+}
+
+bool allFinite(const SampleValue& value) {
+  return isFinite(value.flat) && isFinite(value.rnm[0]) && isFinite(value.rnm[1]) && isFinite(value.rnm[2]);
+}
+
+void WaveTracer::finishSample() {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!covered_[lane]) continue;
+    Path& path = paths_[lane];
+    if (path.radiance != Vec3(0.0f))
+      addLight(static_cast<int>(lane), path.gatherTangent, path.radiance / path.gatherPdf);
+    const std::uint32_t sample = samples_.sample(static_cast<int>(lane));
+    if (!allFinite(path.value)) {
+      result_.nonFinite.push_back({page_, coords_[lane], sample});
+      continue;
+    }
+    TexelResult& texel = result_.texels[lane];
+    texel.sums.add(path.value, static_cast<int>(std::uint64_t{sample} * TexelSums::kBatches /
+                                                static_cast<std::uint64_t>(options_.samples)));
+    if (texel.probed)
+      for (std::size_t i = 0; i < kProbeNormals; ++i) texel.probes[i] += path.probes[i];
+  }
+}
+
+}  // namespace
+
+PathIntegrator::PathIntegrator(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
+                               const PathOptions& options)
+    : transport_(transport), kernels_(kernels), atlas_(atlas), options_(options) {}
+
+WaveResult PathIntegrator::bakeWave(std::uint32_t pageIndex, const PageTexels& page, std::size_t first,
+                                    std::size_t count) const {
+  WaveTracer tracer(transport_, kernels_, atlas_, options_);
+  return tracer.run(pageIndex, page, first, count);
+}
+
+}  // namespace lumel

@@ -1,0 +1,61 @@
+// Unbiased path tracing of the light that reaches texels: a wave of up to 16 texels advances in step, one lane each,
+// so that every ray call is a packet.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "baker/light/light_transport.h"
+#include "baker/path/texel_sums.h"
+#include "baker/rays/non_finite.h"
+#include "lightmap/maps/projection.h"
+#include "lightmap/maps/projection_probe.h"
+#include "lightmap/surface.h"
+#include "lightmap/texels/texels.h"
+
+namespace lumel {
+
+struct PathOptions {
+  int samples = 1;
+  int bounces = 0;
+  bool indirectOnly = false;
+  std::uint64_t seed = 1;
+  bool stratumOrder = true;                  // take samples by cell (NetLanes): the same samples, faster rays
+  TraceMode gatherMode = TraceMode::Packet;  // rays and shadow rays from texels
+  TraceMode bounceMode = TraceMode::Packet;  // those from hits
+};
+
+/// What became of one texel of a wave.
+struct TexelResult {
+  TexelSums sums;
+  float coverage = 0.0f;  // area share; 0: nothing was sampled
+  bool probed = false;
+  std::array<Vec3d, kProbeNormals> probes{};  // sums of light on probeNormals(), where probed
+};
+
+struct WaveResult {
+  std::array<TexelResult, kLanes> texels;
+  std::uint64_t rays = 0;
+  std::uint64_t shadowRays = 0;
+  std::vector<NonFiniteSample> nonFinite;
+};
+
+class PathIntegrator {
+ public:
+  /// Keeps references to all of its arguments.
+  PathIntegrator(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
+                 const PathOptions& options);
+
+  /// Samples texels [first, first + count) of `page`, count <= kLanes. Every kProbeStride-th texel of the page is
+  /// probed. The result depends on the arguments alone, never on the thread.
+  WaveResult bakeWave(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count) const;
+
+ private:
+  const LightTransport& transport_;
+  const RnmKernels& kernels_;
+  const Atlas& atlas_;
+  PathOptions options_;
+};
+
+}  // namespace lumel

@@ -1,0 +1,53 @@
+// What a bake keeps per texel while it samples: sums in double, and how the mean went on its way.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "scene/base/math.h"
+
+namespace lumel {
+
+/// Light of one sample, spread over the maps: each an estimate of irradiance / pi.
+struct SampleValue {
+  Vec3 flat{0};
+  std::array<Vec3, 3> rnm{Vec3(0), Vec3(0), Vec3(0)};
+};
+
+class TexelSums {
+ public:
+  static constexpr int kBatches = 16;
+
+  /// `batch` in [0, kBatches): which stretch of the sample sequence the sample belongs to.
+  void add(const SampleValue& value, int batch) {
+    flat_ += value.flat;
+    for (std::size_t i = 0; i < 3; ++i) rnm_[i] += value.rnm[i];
+    const auto b = static_cast<std::size_t>(batch);
+    batchSum_[b] += static_cast<double>(luminance(value.flat));
+    ++batchCount_[b];
+    ++count_;
+  }
+  void countGatherRay(bool metBackFace) {
+    ++gatherRays_;
+    if (metBackFace) ++backFaces_;
+  }
+
+  std::uint32_t count() const { return count_; }
+  /// Means over the samples that were added; zero where there are none.
+  SampleValue mean() const;
+  /// Share of gather rays that met no back face of a single-sided surface; 1 where none was traced.
+  float validity() const;
+  /// Luminance of the mean over the batches before `batch`; 0 where they have no samples.
+  float luminanceBefore(int batch) const;
+
+ private:
+  Vec3d flat_{0};
+  std::array<Vec3d, 3> rnm_{Vec3d(0), Vec3d(0), Vec3d(0)};
+  std::array<double, kBatches> batchSum_{};
+  std::array<std::uint32_t, kBatches> batchCount_{};
+  std::uint32_t count_ = 0;
+  std::uint32_t gatherRays_ = 0;
+  std::uint32_t backFaces_ = 0;
+};
+
+}  // namespace lumel

@@ -1,0 +1,80 @@
+// What light transport needs of materials: albedo, emission and alpha at a point of a triangle. Textures are decoded
+// only where they shade, emit or cut out.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "scene/images/texture.h"
+#include "scene/scene.h"
+
+namespace lumel {
+
+/// A point of a primitive: weights of the triangle's vertices 1 and 2.
+struct TrianglePoint {
+  const Primitive* primitive = nullptr;
+  std::uint32_t triangle = 0;
+  Vec2 barycentric{0, 0};
+};
+
+class Materials {
+ public:
+  /// Decodes the textures of the materials that casting instances use. `bounces` false: nothing is shaded, base
+  /// colour maps are needed for alpha alone. A texture that cannot be decoded leaves its factor alone; `notes` then
+  /// gains a line.
+  Materials(const Scene& scene, bool bounces, std::vector<std::string>& notes);
+
+  const Material& material(int index) const { return scene_->materials[static_cast<std::size_t>(index)]; }
+
+  /// Share of light reflected, 0..1: base colour times texture times vertex colour.
+  Vec3 albedo(const TrianglePoint& point) const { return albedo(findAlbedo(point)); }
+  /// In two steps, to ask memory for what the second will read.
+  struct AlbedoLookup {
+    Vec3 factor{0};
+    const Texture* texture = nullptr;
+    Texture::Footprint at{};
+
+    void prefetch() const {
+      if (texture != nullptr) texture->prefetch(at);
+    }
+  };
+  AlbedoLookup findAlbedo(const TrianglePoint& point) const {
+    return findAlbedo(point, albedoTexture(point.primitive->material, 0.0f));
+  }
+  static Vec3 albedo(const AlbedoLookup& lookup);
+  /// `texture`: albedoTexture() of the point's material.
+  AlbedoLookup findAlbedo(const TrianglePoint& point, const Texture* texture) const;
+  /// Holds means of the base colour map over roughly `uvWidth` on a side; null: there is no map.
+  const Texture* albedoTexture(int material, float uvWidth) const;
+  /// How wide `share` of a point's triangle is in the texture, as a square.
+  float albedoWidth(const TrianglePoint& point, float share) const;
+  /// Whether albedo() is the same on all of the primitive.
+  bool hasOneAlbedo(const Primitive& primitive) const {
+    return primitive.colors.empty() && colorTexture(primitive.material) == nullptr;
+  }
+  /// Radiance sent out from the front (and from the back where doubleSided): nits. Alpha is not applied.
+  Vec3 emission(const TrianglePoint& point) const;
+  /// 0..1: for MASK 0 or 1 (the cut-off applied), for BLEND the share of light that is held.
+  float opacity(const TrianglePoint& point) const;
+
+  /// An unlit material shows its base colour, which is not light: it emits nothing.
+  bool emits(int index) const { return material(index).emission != Vec3(0.0f) && !material(index).unlit; }
+  /// Whether opacity varies over the primitive or is partial, so that rays must ask for it.
+  bool needsAlphaTest(const Primitive& primitive) const;
+  /// Whether no ray can ever hit the primitive.
+  bool invisible(const Primitive& primitive) const;
+
+ private:
+  const TexturePyramid* colorTexture(int material) const;
+  float alpha(const TrianglePoint& point) const;
+
+  const Scene* scene_;
+  std::vector<std::optional<TexturePyramid>> srgbByImage_;  // per Scene::images
+};
+
+/// Interpolated texture coordinates; (0, 0) where the primitive lacks the set.
+Vec2 uvAt(const TrianglePoint& point, int uvSet);
+
+}  // namespace lumel

@@ -1,0 +1,17 @@
+// Samples that are not finite: counted and named, never silently zeroed.
+#pragma once
+
+#include <cstdint>
+
+#include "lightmap/texels/texels.h"
+
+namespace lumel {
+
+/// A sample left out because it was not finite.
+struct NonFiniteSample {
+  std::uint32_t page = 0;
+  TexelCoord texel;
+  std::uint32_t sample = 0;
+};
+
+}  // namespace lumel

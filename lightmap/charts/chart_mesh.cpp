@@ -1,0 +1,356 @@
+#include "lightmap/charts/chart_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "lightmap/charts/triangle_overlap.h"
+#include "scene/base/union_find.h"
+
+namespace lumel {
+namespace {
+
+// A float UV on a page of some thousand texels is known to about 5e-5 texels: flips a good deal thinner are lost there.
+constexpr double kFlipTexels = 1e-5;
+
+double cornerArea(const std::array<Vec2d, 3>& t) { return cross2(t[1] - t[0], t[2] - t[0]); }
+
+}  // namespace
+
+ChartMesh makeChartMesh(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> triangles) {
+  ChartMesh chart;
+  chart.meshTriangles = std::move(triangles);
+  const std::vector<std::uint32_t>& all = chart.meshTriangles;
+  chart.neighbours.assign(all.size(), {-1, -1, -1});
+  for (std::uint32_t t = 0; t < all.size(); ++t)
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::int32_t other = mesh.neighbours[all[t]][k];
+      if (other < 0) continue;
+      const auto place = std::lower_bound(all.begin(), all.end(), static_cast<std::uint32_t>(other));
+      if (place != all.end() && *place == static_cast<std::uint32_t>(other))
+        chart.neighbours[t][k] = static_cast<std::int32_t>(place - all.begin());
+    }
+  weldCorners(mesh, chart);
+  return chart;
+}
+
+void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart) {
+  const std::size_t count = chart.meshTriangles.size();
+  std::vector<std::uint32_t> corner(3 * count);
+  std::iota(corner.begin(), corner.end(), 0u);
+  for (std::uint32_t t = 0; t < count; ++t) {
+    const auto& mine = mesh.triangles[chart.meshTriangles[t]];
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      if (chart.neighbours[t][k] < 0) continue;
+      const auto u = static_cast<std::uint32_t>(chart.neighbours[t][k]);
+      const auto& theirs = mesh.triangles[chart.meshTriangles[u]];
+      for (const std::uint32_t i : {k, (k + 1) % 3})
+        for (std::uint32_t j = 0; j < 3; ++j)
+          if (mine[i] == theirs[j]) unite(corner, 3 * t + i, 3 * u + j);
+    }
+  }
+  std::vector<std::uint32_t> vertexOf(3 * count, 0);
+  chart.triangles.resize(count);
+  chart.points = {{}, mesh.points.toTexels};
+  for (std::uint32_t i = 0; i < 3 * count; ++i) {
+    const std::uint32_t root = findRoot(corner, i);
+    if (root == i) {
+      vertexOf[i] = static_cast<std::uint32_t>(chart.points.size());
+      chart.points.positions.push_back(mesh.points.positions[mesh.triangles[chart.meshTriangles[i / 3]][i % 3]]);
+    }
+    chart.triangles[i / 3][i % 3] = vertexOf[root];
+  }
+  chart.points.positions.shrink_to_fit();
+}
+
+TriangleSteps stepsFrom(const ChartMesh& chart, std::uint32_t seed) {
+  constexpr std::uint32_t kNotReached = 0xffffffffu;
+  TriangleSteps steps{std::vector<std::uint32_t>(chart.triangles.size(), kNotReached)};
+  std::vector<std::uint32_t> queue = {seed};
+  steps.distance[seed] = 0;
+  for (std::size_t head = 0; head < queue.size(); ++head)
+    for (const std::int32_t n : chart.neighbours[queue[head]])
+      if (n >= 0 && steps.distance[static_cast<std::size_t>(n)] == kNotReached) {
+        steps.distance[static_cast<std::size_t>(n)] = steps.distance[queue[head]] + 1;
+        queue.push_back(static_cast<std::uint32_t>(n));
+      }
+  steps.farthest = queue.back();
+  return steps;
+}
+
+double shortestHeight(const FlatTriangle& f) {
+  return f.x1 * f.y2 / std::max({f.x1, std::hypot(f.x2, f.y2), std::hypot(f.x2 - f.x1, f.y2)});
+}
+
+bool isFlipped(const std::array<Vec2d, 3>& uv) {
+  double longest = 0;
+  for (std::size_t k = 0; k < 3; ++k) longest = std::max(longest, glm::length(uv[(k + 1) % 3] - uv[k]));
+  return !(cornerArea(uv) >= -kFlipTexels * longest);
+}
+
+SingularValues singularValues(const FlatTriangle& surface, const std::array<Vec2d, 3>& uv) {
+  // Jacobian from the surface to the texture: columns for the surface's x and y.
+  const Vec2d jx = (uv[1] - uv[0]) / surface.x1;
+  const Vec2d jy = (uv[2] - uv[0] - jx * surface.x2) / surface.y2;
+  const double trace = glm::dot(jx, jx) + glm::dot(jy, jy);
+  const double det = cross2(jx, jy);
+  const double root = std::sqrt(std::max(0.0, trace * trace - 4 * det * det));
+  const double big = std::sqrt((trace + root) / 2);
+  return {big, big > 0 ? det / big : 0.0};
+}
+
+Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, double limit) {
+  Stretch result;
+  double total = 0, bad = 0, squares = 0;
+  for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
+    const FlatTriangle flat = layFlat(chart, t);
+    const auto& v = chart.triangles[t];
+    const std::array<Vec2d, 3> uv = {uvs[v[0]], uvs[v[1]], uvs[v[2]]};
+    const double area = flat.x1 * flat.y2;
+    total += area;
+    if (!(cornerArea(uv) > 0)) {
+      if (isFlipped(uv) || shortestHeight(flat) > kThinTexels) ++result.flipped;
+      bad += area;
+      continue;
+    }
+    const SingularValues values = singularValues(flat, uv);
+    if (!values.within(limit)) bad += area;
+    squares += area * std::min(0.5 * (1 / (values.big * values.big) + 1 / (values.small * values.small)), 1e3);
+  }
+  result.badShare = bad / total;
+  result.l2 = std::sqrt(squares / total);
+  return result;
+}
+
+double surfaceArea(const ChartMesh& chart) {
+  double area = 0;
+  for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
+    const FlatTriangle flat = layFlat(chart, t);
+    area += 0.5 * flat.x1 * flat.y2;
+  }
+  return area;
+}
+
+void scaleToSurface(const ChartMesh& chart, std::vector<Vec2d>& uvs) {
+  double surface = 0, texture = 0;
+  for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
+    const FlatTriangle flat = layFlat(chart, t);
+    const auto& v = chart.triangles[t];
+    surface += flat.x1 * flat.y2;
+    texture += std::abs(cross2(uvs[v[1]] - uvs[v[0]], uvs[v[2]] - uvs[v[0]]));
+  }
+  if (!(texture > 0)) return;
+  const double scale = std::sqrt(surface / texture);
+  for (Vec2d& uv : uvs) uv *= scale;
+}
+
+namespace {
+
+/// Convex hull (Andrew 1979), counter-clockwise.
+std::vector<Vec2d> convexHull(std::vector<Vec2d> points) {
+  std::sort(points.begin(), points.end(), [](Vec2d a, Vec2d b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
+  std::vector<Vec2d> hull;
+  for (int side = 0; side < 2; ++side) {
+    const std::size_t base = hull.size();
+    for (const Vec2d p : points) {
+      while (hull.size() >= base + 2 && cross2(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0)
+        hull.pop_back();
+      hull.push_back(p);
+    }
+    hull.pop_back();
+    std::reverse(points.begin(), points.end());
+  }
+  return hull;
+}
+
+/// Direction of the smallest enclosing rectangle: it has an edge of the hull on it (Freeman and Shapira 1975).
+Vec2d smallestRectangle(const std::vector<Vec2d>& hull) {
+  Vec2d best{1, 0};
+  double bestArea = std::numeric_limits<double>::infinity();
+  // A hull of very many points is nearly round: some of its edges do.
+  const std::size_t step = 1 + hull.size() / 128;
+  for (std::size_t i = 0; i < hull.size(); i += step) {
+    const Vec2d edge = hull[(i + 1) % hull.size()] - hull[i];
+    const double length = glm::length(edge);
+    if (!(length > 0)) continue;
+    const Vec2d d = edge / length;
+    Vec2d low(std::numeric_limits<double>::infinity()), high = -low;
+    for (const Vec2d p : hull) {
+      const Vec2d q(glm::dot(d, p), cross2(d, p));
+      low = glm::min(low, q);
+      high = glm::max(high, q);
+    }
+    const double area = (high.x - low.x) * (high.y - low.y);
+    if (area < bestArea * (1 - 1e-9)) {
+      bestArea = area;
+      best = d;
+    }
+  }
+  return best;
+}
+
+/// The direction (modulo quarter turns) of most of the border's length; share of the border within half a degree.
+Vec2d dominantDirection(const ChartMesh& chart, std::span<const Vec2d> uvs, double& share) {
+  constexpr int kBins = 180;  // half a degree each
+  std::array<double, kBins> length{};
+  std::array<double, kBins> longest{};
+  std::array<Vec2d, kBins> direction{};
+  double total = 0;
+  for (std::size_t t = 0; t < chart.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (chart.neighbours[t][k] >= 0) continue;
+      const Vec2d edge = uvs[chart.triangles[t][(k + 1) % 3]] - uvs[chart.triangles[t][k]];
+      const double size = glm::length(edge);
+      if (!(size > 0)) continue;
+      const double quarter = std::atan2(edge.y, edge.x) / (std::numbers::pi / 2) + 4;
+      const int bin = static_cast<int>(std::lround((quarter - std::floor(quarter)) * kBins)) % kBins;
+      length[static_cast<std::size_t>(bin)] += size;
+      total += size;
+      if (size > longest[static_cast<std::size_t>(bin)]) {
+        longest[static_cast<std::size_t>(bin)] = size;
+        direction[static_cast<std::size_t>(bin)] = edge / size;
+      }
+    }
+  const auto best = static_cast<std::size_t>(std::max_element(length.begin(), length.end()) - length.begin());
+  const double around = length[best] + length[(best + 1) % kBins] + length[(best + kBins - 1) % kBins];
+  share = total > 0 ? around / total : 0.0;
+  return direction[best];
+}
+
+}  // namespace
+
+void alignToAxes(const ChartMesh& chart, std::vector<Vec2d>& uvs) {
+  constexpr double kDominantShare = 0.3;
+  double share = 0;
+  Vec2d axis = dominantDirection(chart, uvs, share);
+  if (share < kDominantShare) axis = smallestRectangle(convexHull({uvs.begin(), uvs.end()}));
+  for (Vec2d& uv : uvs) uv = Vec2d(glm::dot(axis, uv), cross2(axis, uv));
+}
+
+namespace {
+
+/// Triangles of a flattened chart in square cells, for pairs that may meet.
+class OverlapGrid {
+ public:
+  OverlapGrid(const ChartMesh& chart, std::span<const Vec2d> uvs, double tolerance)
+      : chart_(chart), uvs_(uvs), tolerance_(tolerance) {
+    low_ = Vec2d(std::numeric_limits<double>::infinity());
+    Vec2d high = -low_;
+    for (const Vec2d uv : uvs) {
+      low_ = glm::min(low_, uv);
+      high = glm::max(high, uv);
+    }
+    const Vec2d size = glm::max(high - low_, Vec2d(1e-9));
+    // About one triangle per cell; long thin charts still get square cells.
+    cell_ = std::max(std::sqrt(size.x * size.y / static_cast<double>(chart.triangles.size())),
+                     std::max(size.x, size.y) / 4096);
+    width_ = static_cast<std::size_t>(size.x / cell_) + 1;
+    height_ = static_cast<std::size_t>(size.y / cell_) + 1;
+    fill();
+  }
+
+  bool anyOverlap() const {
+    for (std::size_t cell = 0; cell + 1 < start_.size(); ++cell)
+      for (std::size_t i = start_[cell]; i < start_[cell + 1]; ++i)
+        for (std::size_t j = start_[cell]; j < i; ++j)
+          // Two layers cannot lie on each other without the border of one of them doing so.
+          if ((onBorder_[entries_[i]] || onBorder_[entries_[j]]) && overlap(entries_[i], entries_[j])) return true;
+    return false;
+  }
+
+ private:
+  std::array<Vec2d, 3> corners(std::uint32_t t) const {
+    const auto& v = chart_.triangles[t];
+    return {uvs_[v[0]], uvs_[v[1]], uvs_[v[2]]};
+  }
+
+  template <class Visit>
+  void visitCells(std::uint32_t t, Visit visit) const {
+    const std::array<Vec2d, 3> p = corners(t);
+    const double top = std::min({p[0].y, p[1].y, p[2].y});
+    const double bottom = std::max({p[0].y, p[1].y, p[2].y});
+    const auto row = [this](double y) {
+      return std::min(height_ - 1, static_cast<std::size_t>(std::max(0.0, (y - low_.y) / cell_)));
+    };
+    for (std::size_t y = row(top); y <= row(bottom); ++y) {
+      const double y0 = low_.y + static_cast<double>(y) * cell_;
+      const double y1 = y0 + cell_;
+      double left = std::numeric_limits<double>::infinity(), right = -left;
+      for (std::size_t k = 0; k < 3; ++k) {  // the band's part of each edge
+        const Vec2d a = p[k];
+        const Vec2d b = p[(k + 1) % 3];
+        if (std::max(a.y, b.y) < y0 || std::min(a.y, b.y) > y1) continue;
+        const double dy = b.y - a.y;
+        for (const double at : {y0, y1}) {
+          const double s = dy == 0 ? 0.0 : std::clamp((at - a.y) / dy, 0.0, 1.0);
+          const double x = a.x + s * (b.x - a.x);
+          left = std::min(left, dy == 0 ? std::min(a.x, b.x) : x);
+          right = std::max(right, dy == 0 ? std::max(a.x, b.x) : x);
+        }
+      }
+      if (left > right) continue;
+      const auto column = [this](double x) {
+        return std::min(width_ - 1, static_cast<std::size_t>(std::max(0.0, (x - low_.x) / cell_)));
+      };
+      for (std::size_t x = column(left); x <= column(right); ++x) visit(y * width_ + x);
+    }
+  }
+
+  void fill() {
+    const auto count = static_cast<std::uint32_t>(chart_.triangles.size());
+    onBorder_.resize(count);
+    start_.assign(width_ * height_ + 1, 0);
+    for (std::uint32_t t = 0; t < count; ++t) {
+      const auto& n = chart_.neighbours[t];
+      onBorder_[t] = n[0] < 0 || n[1] < 0 || n[2] < 0;
+      visitCells(t, [this](std::size_t cell) { ++start_[cell + 1]; });
+    }
+    for (std::size_t i = 1; i < start_.size(); ++i) start_[i] += start_[i - 1];
+    entries_.resize(start_.back());
+    std::vector<std::size_t> next(start_.begin(), start_.end() - 1);
+    for (std::uint32_t t = 0; t < count; ++t) visitCells(t, [&](std::size_t cell) { entries_[next[cell]++] = t; });
+  }
+
+  /// Separating axes: along every edge's normal the triangles must come apart up to the tolerance.
+  bool overlap(std::uint32_t s, std::uint32_t t) const {
+    const std::array<Vec2d, 3> a = corners(s);
+    const std::array<Vec2d, 3> b = corners(t);
+    if (!(cornerArea(a) > 0) || !(cornerArea(b) > 0)) return false;  // no area to lie on anything
+    return trianglesOverlap(a, b, tolerance_);
+  }
+
+  const ChartMesh& chart_;
+  std::span<const Vec2d> uvs_;
+  double tolerance_;
+  Vec2d low_;
+  double cell_ = 1;
+  std::size_t width_ = 1, height_ = 1;
+  std::vector<std::size_t> start_;
+  std::vector<std::uint32_t> entries_;
+  std::vector<bool> onBorder_;
+};
+
+}  // namespace
+
+bool packsWell(Vec2d size, double area, double largestSide) {
+  constexpr double kLargeShare = 0.05;  // of the page, by the box
+  constexpr double kEmptyShare = 0.3;   // of the box
+  if (std::max(size.x, size.y) > largestSide) return false;
+  const double box = size.x * size.y;
+  return box < kLargeShare * largestSide * largestSide || area > kEmptyShare * box;
+}
+
+bool packsWell(std::span<const Vec2d> uvs, double area, double largestSide) {
+  Vec2d low = uvs[0], high = uvs[0];
+  for (const Vec2d uv : uvs) {
+    low = glm::min(low, uv);
+    high = glm::max(high, uv);
+  }
+  return packsWell(high - low, area, largestSide);
+}
+
+bool overlapsItself(const ChartMesh& chart, std::span<const Vec2d> uvs, double tolerance) {
+  return chart.triangles.size() > 1 && OverlapGrid(chart, uvs, tolerance).anyOverlap();
+}
+
+}  // namespace lumel
