@@ -6,6 +6,7 @@
 
 #include "lightmap/maps/rnm_basis.h"
 #include "ssbump/mesh/low_poly.h"
+#include "ssbump/occlusion/horizon.h"
 #include "tests/mentions.h"
 #include "tests/ssbump/closed_forms.h"
 #include "tests/ssbump/fields.h"
