@@ -19,9 +19,6 @@ namespace {
 
 constexpr std::size_t kMostNotes = 10;
 
-/// Bounces of the path integrator where all that matter are asked for; Russian roulette ends paths well before.
-constexpr int kLongestPath = 64;
-
 /// Samples where nothing shines: only validity is left to find out.
 constexpr int kSamplesInTheDark = 8;
 
@@ -249,7 +246,7 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
                                             Progress& progress) {
   const PathIntegrator integrator(transport, kernels, atlas,
                                   {.samples = std::max(1, options.samples),
-                                   .bounces = options.bounces < 0 ? kLongestPath : options.bounces,
+                                   .bounces = options.bounces,
                                    .indirectOnly = options.indirectOnly,
                                    .seed = options.seed});
   pages.resize(atlas.pages.size());

@@ -34,8 +34,6 @@ constexpr double kSettled = 1e-4;
 constexpr double kMostBeyond = 0.002;
 constexpr double kSlowest = 0.98;
 constexpr int kMostSweeps = 256;
-/// Longest path through surfaces without texels, where bounces have no end of their own.
-constexpr int kLongestPath = 64;
 constexpr std::size_t kSweepGrain = 4096;
 constexpr std::size_t kWaveGrain = kSweepGrain / kLanes;
 /// Whether more or less than half of a texel's rays meet backs is certain where the lead squared, in rays, is this many

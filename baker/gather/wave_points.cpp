@@ -5,6 +5,8 @@
 #include <cstring>
 #include <limits>
 
+#include "baker/rays/ray_start.h"
+#include "lightmap/texels/vertex_normal.h"
 #include "scene/base/check.h"
 
 namespace lumel {
@@ -66,12 +68,7 @@ WavePoints::Source WavePoints::sourceOf(const RayScene& rays, const Surface& sur
   source.flat = source.normals[0] == source.normals[1] && source.normals[0] == source.normals[2] &&
                 source.tangents[0] == source.tangents[1] && source.tangents[0] == source.tangents[2];
   source.rounded = isRounded(source.ng, source.e1, source.e2, source.normals);
-  if (source.flat) {
-    const Vec3& normal = source.normals[0];
-    const float length2 = glm::dot(normal, normal);
-    const bool isSmooth = length2 > 1e-12f && std::isfinite(length2);
-    source.frame = frameFromTangent(isSmooth ? normal / std::sqrt(length2) : source.ng, source.tangents[0]);
-  }
+  if (source.flat) source.frame = frameFromTangent(unitNormalOr(source.normals[0], source.ng), source.tangents[0]);
   return source;
 }
 
@@ -201,10 +198,9 @@ LUMEL_FOR_EACH_CPU void WavePoints::locateFrames(const Source& from, std::uint32
     const float w1 = places.x[i], w2 = places.y[i];
     const float w0 = 1.0f - w1 - w2;
     const Vec3 normal = w0 * normals[0] + w1 * normals[1] + w2 * normals[2];
-    const float length2 = glm::dot(normal, normal);
-    const bool isSmooth = (length2 > 1e-12f) & (length2 <= kMostFinite);
-    const float shrink = 1.0f / std::sqrt(pick(isSmooth, length2, 1.0f));
-    const Vec3 n = pick(isSmooth, normal * shrink, ng);
+    const float length = directedLength(normal);
+    const bool isDirected = length > 0.0f;
+    const Vec3 n = pick(isDirected, normal * (1.0f / pick(isDirected, length, 1.0f)), ng);
     const Vec3 raw = w0 * Vec3(tangents[0]) + w1 * Vec3(tangents[1]) + w2 * Vec3(tangents[2]);
     const Vec3 side = raw - n * glm::dot(n, raw);
     const float side2 = glm::dot(side, side);
@@ -231,7 +227,7 @@ LUMEL_FOR_EACH_CPU void WavePoints::lift(const Source& from, std::uint32_t numbe
   for (std::uint32_t i = 0; i < kMost; ++i) {
     const float w1 = places.x[i], w2 = places.y[i];
     const Vec3 move = liftToRound(w1 * e1 + w2 * e2, e1, e2, {w1, w2}, normals);
-    const bool lifted = (places.source[i] == number) & (glm::dot(move, ng) > distance);
+    const bool lifted = (places.source[i] == number) & isLifted(move, ng, distance);
     for (int k = 0; k < 3; ++k) {
       drawn.rayStart[k][i] += pick(lifted, move[k], 0.0f);
       drawn.ng[k][i] = pick(lifted, drawn.n[k][i], drawn.ng[k][i]);

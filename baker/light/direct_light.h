@@ -11,7 +11,7 @@
 
 namespace lumel {
 
-/// A point that receives light; both normals on the side that light is gathered on.
+/// A point that receives light. Both normals lie on the side that light is gathered on.
 struct Receiver {
   Vec3 p{0};
   Vec3 ng{0, 0, 1};
@@ -22,21 +22,22 @@ struct Receiver {
 /// The sample patterns that one receiver's decisions use, counted from a base.
 enum LightPattern : std::uint32_t { kPunctual, kEmitter, kEmitterPoint, kSun, kSky, kLightPatterns };
 
-/// One way to take a light sample. All that a scene needs (lightStrategies) add up to its direct light.
+/// Names one way to take a light sample. The strategies that a scene needs (lightStrategies) add up to its direct
+/// light.
 struct LightStrategy {
   enum Kind { EveryPunctual, NearPunctual, OnePunctual, Emissive, Sun, Sky };
   Kind kind = EveryPunctual;
   std::size_t light = 0;  // of OnePunctual
 };
 
-/// No more punctual lights than this are sampled each by itself.
+/// Up to this many punctual lights are sampled each by itself.
 inline constexpr std::size_t kSeparateLights = 8;
 
-/// `separate`: a strategy for each punctual light, where there are few; of more, for each directional one, if these are
-/// few, and one that chooses among the rest. Else one that chooses among all.
+/// Returns the strategies that a scene needs. With `separate` each punctual light has one of its own where they are
+/// few; of more, each directional light has one if these are few, and the rest share one. Else one chooses among all.
 std::vector<LightStrategy> lightStrategies(const LightTransport& transport, bool separate);
 
-/// The receivers of a wave: those lanes that are `active`.
+/// Holds the receivers of a wave; lanes count where `active`.
 struct LightLanes {
   LaneFlags active{};
   std::array<Receiver, kLanes> receivers;
@@ -55,9 +56,9 @@ struct SampledLight {
   bool found(std::size_t lane) const { return shadows.visible(static_cast<int>(lane)); }
 };
 
-/// Takes one light sample by `strategy` for every active lane. `density`: with which the receivers gather from a
-/// direction, for multiple importance sampling against hits. Samples whose shadow rays are to be traced are set in
-/// `sampled.shadows`; returns their number. `sky`: of Sky, what findSky() found for these samples, if that is known.
+/// Takes one light sample by `strategy` for every active lane. `density` is the one with which the receivers gather
+/// from a direction, for multiple importance sampling against hits. Samples whose shadow rays are to be traced are set
+/// in `sampled.shadows`; returns their number. `sky` is what findSky() found for these samples, if that is known.
 std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& strategy, const ReceiverLanes& receivers,
                         const SampleLanes& samples, std::uint32_t patternBase, const SurfaceDensity& density,
                         SampledLight& sampled, const EnvironmentLight::Places* sky = nullptr);

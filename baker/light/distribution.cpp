@@ -61,8 +61,8 @@ inline std::size_t Distribution::guideTo(float u) const {
   return static_cast<std::size_t>(guide_[std::min(place, size_ - 1)]);
 }
 
-/// From an index that is not too late to the one whose interval holds u. Without a branch for a step: how many there
-/// are cannot be foretold.
+/// Goes from an index that is not too late to the one whose interval holds u. It takes a branch only every kAhead
+/// steps: how many there are cannot be foretold.
 inline std::size_t Distribution::advance(std::size_t index, float u) const {
   for (;;) {
     std::size_t steps = 0;
@@ -71,8 +71,6 @@ inline std::size_t Distribution::advance(std::size_t index, float u) const {
     if (steps < kAhead) return index;
   }
 }
-
-std::size_t Distribution::choose(float u) const { return advance(guideTo(u), u); }
 
 void Distribution::choose(const float* u, Lanes& chosen) const {
   // Each step for all lanes before the next one, so that they wait for memory together.
@@ -86,10 +84,6 @@ void Distribution::choose(const float* u, Lanes& chosen) const {
     chosen.index[lane] = static_cast<int>(at);
     chosen.rest[lane] = restOf(u[lane], cumulative_[at], cumulative_[at + 1]);
   }
-}
-
-float Distribution::rest(float u, std::size_t index) const {
-  return restOf(u, cumulative_[index], cumulative_[index + 1]);
 }
 
 DistributionRows::DistributionRows(std::span<const float> weights, std::size_t rows) {
@@ -130,7 +124,7 @@ void DistributionRows::fill(std::span<const float> weights, std::size_t row) {
   for (std::size_t part = 0; part < kParts; ++part) ofParts_[row * kParts + part] = lowest[part * partSize_];
 }
 
-/// How many of Count entries are not above `step`.
+/// Counts the entries, of Count, that are not above `step`.
 template <std::size_t Count>
 [[gnu::always_inline]] inline std::size_t countUpTo(const std::uint16_t* entries, std::uint16_t step) {
   int count = 0;
@@ -146,7 +140,7 @@ LUMEL_FOR_EACH_CPU void DistributionRows::find(const DistributionRows& all, cons
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const auto row = static_cast<std::size_t>(rows[lane]);
     steps[lane] = static_cast<std::uint16_t>(static_cast<int>(u[lane] * static_cast<float>(kRowSteps)));
-    // Of indices that begin at the same step only the last has a share.
+    // Where indices begin at the same step only the last has a share.
     const std::size_t part = countUpTo<kParts>(all.ofParts_.data() + row * kParts, steps[lane]) - 1;
     begins[lane] = part * partSize;
     for (std::size_t i = 0; i <= partSize; i += 32)

@@ -10,11 +10,11 @@
 
 namespace lumel {
 
-/// Cumulative tables over n weights, chosen by inversion, so stratified u stay stratified; a guide table says where in
-/// it to begin, so that a choice takes two steps on average, whatever n is (Chen and Asau 1974).
-/// A table's entries are multiples of 2^-24, the grid on which the samplers' u lie: the probability that is reported is
-/// exactly the share of u that chooses an index, for any number of weights. Every positive weight keeps at least one
-/// step of that grid (if there are fewer than 2^22 of them), however small its share.
+/// Chooses an index by inverting a cumulative table over n weights, so stratified u stay stratified; a guide table says
+/// where in it to begin, so that a choice takes two steps on average, whatever n is (Chen and Asau 1974). A table's
+/// entries are multiples of 2^-24, the grid on which the samplers' u lie: the probability that is reported is exactly
+/// the share of u that chooses an index, for any number of weights. Every positive weight keeps at least one step of
+/// that grid (if there are fewer than 2^22 of them), however small its share.
 class Distribution {
  public:
   Distribution() = default;
@@ -24,20 +24,17 @@ class Distribution {
 
   bool empty() const { return !(total_ > 0.0); }
   std::size_t size() const { return size_; }
-  /// Sum of the weights.
+  /// Returns the sum of the weights.
   double total() const { return total_; }
 
-  /// The index chosen by u in [0, 1). Density over indices: probability(index) > 0. Precondition: not empty().
-  std::size_t choose(float u) const;
-  /// Where u lies within the interval of `index`, in [0, 1): to use u once more.
-  float rest(float u, std::size_t index) const;
   float probability(std::size_t index) const { return cumulative_[index + 1] - cumulative_[index]; }
 
-  /// choose() and rest() for all lanes.
   struct Lanes {
     alignas(64) int index[kLanes];
-    alignas(64) float rest[kLanes];
+    alignas(64) float rest[kLanes];  // where u lies within the index's interval, in [0, 1): to use u once more
   };
+  /// The index that each of kLanes numbers u in [0, 1) chooses. Density over indices: probability(index) > 0.
+  /// Precondition: not empty().
   void choose(const float* u, Lanes& chosen) const;
 
  private:
@@ -53,10 +50,10 @@ class Distribution {
   double total_ = 0.0;
 };
 
-/// Distributions side by side, as many weights in each, for tables that are larger than a processor's caches: 2 bytes
-/// per weight, of which a choice reads one part. They are coarser: of a row of n weights the shares are multiples of
-/// 2^-15, within 2^-15 (and n 2^-15 of their size) of what they should be, and every positive weight keeps one. The
-/// probability that is reported is exactly the share of u, as above.
+/// Holds distributions side by side, with as many weights in each, for tables that are larger than a processor's
+/// caches: they take 2 bytes per weight, of which a choice reads one part. They are coarser: the shares of n weights
+/// are multiples of 2^-15, within 2^-15 (and n 2^-15 of their size) of what they should be, and every positive weight
+/// keeps one. The probability that is reported is exactly the share of u, as above.
 class DistributionRows {
  public:
   static constexpr std::size_t kMostWeights = 4096;
@@ -71,7 +68,7 @@ class DistributionRows {
     const std::uint16_t* lowest = lowest_.data() + row * stride_;
     return static_cast<float>(lowest[index + 1] - lowest[index]) * 0x1p-15f;
   }
-  /// Of each lane in the row given. Precondition: none of these is empty().
+  /// Chooses an index for each lane in the row given. Precondition: none of these rows is empty().
   void choose(const float* u, const LaneFlags& rows, Distribution::Lanes& chosen) const;
 
  private:

@@ -1,17 +1,18 @@
+#include "baker/light/emissive_triangles.h"
+
 #include <algorithm>
 #include <array>
 
-#include "baker/light/lights.h"
 #include "baker/rays/sampling.h"
 #include "scene/base/parallel.h"
 
 namespace lumel {
 namespace {
 
-/// Points on a side of the triangular grid that a texture's emission is averaged over.
+/// A texture's emission is averaged over a triangular grid with this many points on a side.
 constexpr int kEmissionGrid = 8;
 
-/// Mean luminance over a triangle of what it sends out where it is not cut out.
+/// Returns the mean luminance over a triangle of what it sends out where it is not cut out.
 float meanEmission(const Materials& materials, const Primitive& primitive, std::uint32_t triangle) {
   const Material& material = materials.material(primitive.material);
   const bool varies = material.emissionMap || materials.needsAlphaTest(primitive);
@@ -30,20 +31,20 @@ float meanEmission(const Materials& materials, const Primitive& primitive, std::
   return (solidAngle > EmissiveTriangles::kLeastSolidAngle) & (solidAngle < EmissiveTriangles::kMostSolidAngle);
 }
 
-/// A cosine, or length, as the side of a triangle has it that p looks at: 0 from behind, unless it shines there too
-/// (back = 1; else 0).
+/// Returns a cosine, or length, for the side of a triangle that p looks at: 0 from behind, unless the triangle shines
+/// there too (back = 1; else 0).
 [[gnu::always_inline]] inline float facing(float front, float back) {
   const float behind = -back * front;
   return front > behind ? front : behind;
 }
 
-/// Of the corners as a point sees them, what their solid angle is made of (sampling.h); 0 from the side that does not
-/// shine. `a`: the first of them.
+/// Returns the volume that the solid angle of the corners as a point sees them is made of (sampling.h); 0 from the side
+/// that does not shine. `a` is the first corner.
 [[gnu::always_inline]] inline float volumeOf(const Vec3& a, const Vec3& ng, float doubleArea, float back) {
   return facing(-glm::dot(a, ng), back) * doubleArea;
 }
 
-/// Mean luminance times solid angle to half a percent: atan(x) is x / (1 + 0.28 x^2) within 0.005 for |x| <= 1.
+/// Returns mean luminance times solid angle to half a percent: atan(x) is x / (1 + 0.28 x^2) within 0.005 for |x| <= 1.
 [[gnu::always_inline]] inline float importanceOf(const Vec3& a, const Vec3& e1, const Vec3& e2, float seen,
                                                  float luminance) {
   const float below = belowSolidAngle<Vec3, float>(a, a + e1, a + e2);
@@ -60,9 +61,9 @@ float meanEmission(const Materials& materials, const Primitive& primitive, std::
 
 }  // namespace
 
-/// The emitters that the lanes chose, by what sampling needs of them.
+/// Holds what sampling needs of the emitters that the lanes chose.
 struct alignas(64) EmissiveTriangles::Chosen {
-  // As an emitter begins.
+  // These members are laid out as an emitter begins.
   Vec3Lanes corner;
   float doubleArea[kLanes] = {};
   Vec3Lanes e1;
@@ -137,7 +138,7 @@ float EmissiveTriangles::importance(std::uint32_t triangle, const Vec3& p) const
   return importanceOf(a, e.e1, e.e2, volumeOf(a, e.ng, e.doubleArea, e.back), e.luminance);
 }
 
-/// As LightTree::choose among the lights of a leaf.
+/// Chooses among few emitters by importance, as LightTree::chooseInLeaf does.
 LUMEL_FOR_EACH_CPU void EmissiveTriangles::chooseAmongFew(std::span<const Emitter> few, const Vec3Lanes& p,
                                                           const UnitLanes& u, Chosen& chosen) {
   alignas(64) float each[LightTree::kLeaf][kLanes];
@@ -184,7 +185,7 @@ LUMEL_FOR_EACH_CPU void EmissiveTriangles::chooseAmongFew(std::span<const Emitte
     chosen.probability[lane] = taken[lane] / pick(total[lane] > 0.0f, total[lane], 1.0f);
 }
 
-/// The same among the lights of each lane's leaf.
+/// Chooses among the emitters of each lane's leaf.
 LUMEL_FOR_EACH_CPU void EmissiveTriangles::chooseInLeaves(const Emitter* triangles,
                                                           const std::array<LaneFlags, LightTree::kLeaf>& lights,
                                                           const LightTree::Descent& descent, const Vec3Lanes& p,
@@ -222,7 +223,7 @@ LUMEL_FOR_EACH_CPU void EmissiveTriangles::chooseInLeaves(const Emitter* triangl
   }
 }
 
-/// Points on the chosen triangles, and what they send to p.
+/// Draws points on the chosen triangles, and finds what they send to p.
 LUMEL_FOR_EACH_CPU void EmissiveTriangles::samplePoints(const Vec3Lanes& p, const UnitSquareLanes& u, Chosen& chosen,
                                                         LightSampleLanes& samples) {
 #pragma GCC ivdep
@@ -239,7 +240,7 @@ LUMEL_FOR_EACH_CPU void EmissiveTriangles::samplePoints(const Vec3Lanes& p, cons
     const float perA = 1.0f / glm::length(a), perB = 1.0f / glm::length(b), perC = 1.0f / glm::length(c);
     const SphericalTriangleOf<float> sphere{a * perA, b * perB, c * perC};
     const Vec3 towards = sphere.sample({u.x[lane], u.y[lane]}, solidAngle, volume * perA * perB * perC);
-    // Where the direction meets the triangle (Moeller and Trumbore 1997).
+    // The direction meets the triangle at (first, second) (Moeller and Trumbore 1997).
     const Vec3 across = glm::cross(towards, e2);
     const float below = glm::dot(e1, across);
     const float perBelow = 1.0f / pick(below != 0.0f, below, 1.0f);
@@ -301,19 +302,6 @@ void EmissiveTriangles::sample(const Vec3Lanes& p, const LaneFlags& active, cons
     if (!emitter.uniform && samples.pdf[lane] > 0.0f)
       samples.weight.set(lane, radianceAt(emitter, {chosen.x[lane], chosen.y[lane]}) / samples.pdf[lane]);
   }
-}
-
-LightSample EmissiveTriangles::sample(const Vec3& p, float uTriangle, Vec2 uPoint) const {
-  Vec3Lanes points;
-  points.set(0, p);
-  UnitLanes choice{};
-  choice.u[0] = uTriangle;
-  UnitSquareLanes place{};
-  place.x[0] = uPoint.x;
-  place.y[0] = uPoint.y;
-  LightSampleLanes samples;
-  sample(points, {1}, choice, place, samples);
-  return {samples.wi[0], samples.weight[0], samples.pdf[0], false, samples.target[0]};
 }
 
 float EmissiveTriangles::pdf(const HitSurface& hit, const Vec3& origin) const {

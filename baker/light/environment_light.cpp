@@ -16,7 +16,7 @@ double versine(double angle) {
   return 2.0 * s * s;
 }
 
-/// How many cells stand for so many pixels.
+/// Returns how many cells stand for so many pixels.
 std::size_t cellsFor(int pixels, std::size_t fewest, std::size_t most) {
   const auto n = static_cast<std::size_t>(pixels);
   if (n < fewest) return n * ((fewest + n - 1) / n);
@@ -24,13 +24,14 @@ std::size_t cellsFor(int pixels, std::size_t fewest, std::size_t most) {
   return (n + joined - 1) / joined;
 }
 
-/// Along one axis: the cells' means are weighted sums of pixels, from `first` on, which may lie beyond the image.
+/// The weights of one cell along one axis: its mean is a weighted sum of pixels, from `first` on, which may lie beyond
+/// the image.
 struct CellWeights {
   std::int64_t first = 0;
   std::vector<double> weights;
 };
 
-/// Integrals of the linear interpolant of `pixels` over `cells` equal intervals, weighed by `measure` of the place
+/// Integrates the linear interpolant of `pixels` over `cells` equal intervals, weighed by `measure` of the place
 /// (0..1) and scaled to add up to one. Simpson's rule from bend to bend: exact to the 3rd order.
 template <class Measure>
 std::vector<CellWeights> weightsAlong(int pixels, std::size_t cells, Measure measure) {
@@ -83,7 +84,7 @@ EnvironmentLight::EnvironmentLight(const Environment& environment) {
   addSky(luminances);
 }
 
-/// Fills cells_ but for the densities. Returns their luminances.
+/// Fills cells_ except for the densities. Returns the cells' luminances.
 std::vector<float> EnvironmentLight::addCells(const Environment& environment) {
   const Image& image = environment.image;
   const std::size_t rows = rowsFor(image);
@@ -161,7 +162,7 @@ void EnvironmentLight::splitOffSun(std::vector<float>& luminances) {
   }
 }
 
-/// The table of what is left.
+/// Makes the table of the cells that are left.
 void EnvironmentLight::addSky(const std::vector<float>& luminances) {
   const auto rows = static_cast<std::size_t>(grid_.rows), columns = static_cast<std::size_t>(grid_.columns);
   columns_ = DistributionRows(luminances, rows);
@@ -224,7 +225,8 @@ Vec3 EnvironmentLight::radiance(const Vec3& dirWorld) const { return cellTowards
 
 float EnvironmentLight::pdf(const Vec3& dirWorld) const { return shines() ? cellTowards(dirWorld).pdf : 0.0f; }
 
-/// Uniform by solid angle within the cells: cos of the polar angle is uniform between a cell's borders.
+/// Aims at the chosen places, uniformly by solid angle within the cells: cos of the polar angle is uniform between a
+/// cell's borders.
 LUMEL_FOR_EACH_CPU void EnvironmentLight::aim(const Grid& grid, const float* versines, const Places& places,
                                               LightSampleLanes& samples) {
   const float cosRotation = grid.cosRotation, sinRotation = grid.sinRotation;
@@ -252,7 +254,7 @@ LUMEL_FOR_EACH_CPU void EnvironmentLight::aim(const Grid& grid, const float* ver
   }
 }
 
-/// Makes weights of radiances.
+/// Divides radiances by densities, which makes them weights.
 LUMEL_FOR_EACH_CPU void EnvironmentLight::weigh(LightSampleLanes& samples) {
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     samples.weight.x[lane] /= samples.pdf[lane];
@@ -299,29 +301,6 @@ EnvironmentLight::Places EnvironmentLight::findSky(const UnitSquareLanes& u) con
     places.y[lane] = row.rest[lane];
   }
   return places;
-}
-
-namespace {
-
-/// All lanes alike, of which one is asked for.
-template <class Sample>
-LightSample oneOf(Vec2 u, Sample sample) {
-  UnitSquareLanes lanes;
-  std::fill(std::begin(lanes.x), std::end(lanes.x), u.x);
-  std::fill(std::begin(lanes.y), std::end(lanes.y), u.y);
-  LightSampleLanes samples;
-  sample(lanes, samples);
-  return {samples.wi[0], samples.weight[0], samples.pdf[0], true, Vec3(0.0f)};
-}
-
-}  // namespace
-
-LightSample EnvironmentLight::sampleSun(Vec2 u) const {
-  return oneOf(u, [&](const UnitSquareLanes& lanes, LightSampleLanes& samples) { sampleSun(lanes, samples); });
-}
-
-LightSample EnvironmentLight::sampleSky(Vec2 u) const {
-  return oneOf(u, [&](const UnitSquareLanes& lanes, LightSampleLanes& samples) { sampleSky(lanes, samples); });
 }
 
 }  // namespace lumel

@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "baker/light/distribution.h"
-#include "baker/light/lights.h"
+#include "baker/light/light_sample.h"
+#include "baker/rays/sample_lanes.h"
 #include "scene/scene.h"
 
 namespace lumel {
@@ -24,35 +25,33 @@ class EnvironmentLight {
   /// gathers from, and a black one costs nothing. Memory: 18 bytes per cell.
   explicit EnvironmentLight(const Environment& environment);
 
-  /// How many cells stand for an image; one for none.
+  /// Returns how many cells stand for an image; one where there is none.
   static std::size_t cellCount(const Image& image);
 
-  /// Whether rays that leave the scene bring anything back.
+  /// Tells whether rays that leave the scene bring anything back.
   bool shines() const { return !cells_.empty(); }
-  /// Whether sampleSun() and sampleSky() are of use.
+  /// Tell whether sampleSun() and sampleSky() are of use.
   bool sunSampled() const { return !sun_.empty(); }
   bool skySampled() const { return !rows_.empty(); }
-  /// Whether pdf() is not zero everywhere.
+  /// Tells whether pdf() is positive anywhere.
   bool sampled() const { return sunSampled() || skySampled(); }
 
-  /// Precondition of these: shines().
+  /// Returns the radiance that arrives from a direction. Precondition of this and of arriving(): shines().
   Vec3 radiance(const Vec3& dirWorld) const;
-  /// Of the part that the direction lies in.
+  /// Returns the density per solid angle with which the part that the direction lies in is sampled there.
   float pdf(const Vec3& dirWorld) const;
-  /// What rays that were gathered with density `gathered` bring, weighed against the samples below. A lane may hold
-  /// anything.
+  /// Returns what rays that were gathered with density `gathered` bring, weighed against the samples below. Lanes whose
+  /// result is not used may hold any direction.
   Vec3 arriving(const Vec3& dirWorld, float gathered) const;
   void arriving(const Vec3Lanes& dirWorld, const float* gathered, Vec3Lanes& light) const;
 
   /// Density: pdf(wi) in either part, in proportion to the luminance of the cells, by solid angle within a cell; each
   /// integrates to one over its part. Precondition: sunSampled(), skySampled().
-  LightSample sampleSun(Vec2 u) const;
-  LightSample sampleSky(Vec2 u) const;
   void sampleSun(const UnitSquareLanes& u, LightSampleLanes& samples) const;
   void sampleSky(const UnitSquareLanes& u, LightSampleLanes& samples) const;
-  /// Cells that were chosen, and where in them.
+  /// Names the cells that were chosen, and the places in them.
   struct Places;
-  /// In two steps: the first asks memory for the cells.
+  /// sampleSky() in two steps: the first asks memory for the cells.
   Places findSky(const UnitSquareLanes& u) const;
   void sampleSky(const Places& places, LightSampleLanes& samples) const { take(places, samples); }
 
@@ -71,7 +70,7 @@ class EnvironmentLight {
     Vec3 radiance{0};
     float pdf = 0.0f;
   };
-  /// How cells lie about the sphere.
+  /// Says how cells lie about the sphere.
   struct Grid {
     int rows = 1;
     int columns = 1;

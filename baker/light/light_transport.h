@@ -1,12 +1,17 @@
 // Everything that light meets on its way through a scene, as the integrators see it.
 #pragma once
 
+#include "baker/light/emissive_triangles.h"
 #include "baker/light/environment_light.h"
-#include "baker/light/lights.h"
+#include "baker/light/punctual_lights.h"
 #include "baker/rays/materials.h"
 #include "baker/rays/ray_scene.h"
 
 namespace lumel {
+
+/// The most hits of a path that is followed ray by ray, where bounces have no end of their own; Russian roulette ends
+/// paths well before.
+inline constexpr int kLongestPath = 64;
 
 /// What the scene lacks is empty and costs nothing.
 struct LightTransport {
@@ -16,7 +21,7 @@ struct LightTransport {
   const EmissiveTriangles& emissive;
   const EnvironmentLight& environment;
 
-  /// Whether a ray can bring light back by itself, by what it hits or by leaving the scene.
+  /// Tells whether a ray can bring light back by itself, by what it hits or by leaving the scene.
   bool raysSeeLight() const { return !emissive.empty() || environment.shines(); }
   bool dark() const { return !raysSeeLight() && punctual.empty(); }
 };

@@ -10,16 +10,16 @@ namespace lumel {
 namespace {
 
 constexpr int kBins = 12;
-/// Levels below which groups are halved by number, so that the depth stays bounded.
+/// Groups below this level are halved by number, so that the depth stays bounded.
 constexpr int kHalveBelow = 32;
 
-/// Mean of 1 + 2 cosTheta over a hemisphere.
+/// The mean of 1 + 2 cosTheta over a hemisphere.
 constexpr float kAnySide = 2.0f;
 
 [[gnu::always_inline]] inline float rootOf(float x) { return std::sqrt(pick(x > 0.0f, x, 0.0f)); }
 [[gnu::always_inline]] inline float sineOf(float cosine) { return rootOf(1.0f - cosine * cosine); }
 
-/// Cosine and sine of max(0, a - b) for angles in [0, pi] given by theirs.
+/// An angle in [0, pi] by its cosine and sine; lessened(a, b) is max(0, a - b).
 struct Angle {
   float cosine = 1.0f;
   float sine = 0.0f;
@@ -30,7 +30,7 @@ struct Angle {
           pick(none, 0.0f, a.sine * b.cosine - a.cosine * b.sine)};
 }
 
-/// The smallest cone about two: its axis lies between theirs.
+/// Widens the cone of `a` to the smallest one about both: its axis lies between theirs.
 void uniteCones(LightBounds& a, const LightBounds& b) {
   a.cosEmit = std::min(a.cosEmit, b.cosEmit);
   const float angleA = std::acos(std::clamp(a.cosSpread, -1.0f, 1.0f));
@@ -68,8 +68,8 @@ void unite(LightBounds& a, const LightBounds& b) {
   uniteCones(a, b);
 }
 
-/// Cost of a group (Conty Estevez and Kulla, eq. 1): power times the measure of the directions that it shines in times
-/// its surface.
+/// Returns the cost of a group (Conty Estevez and Kulla, eq. 1): power times the measure of the directions that it
+/// shines in times its surface.
 float groupCost(const LightBounds& bounds) {
   const float spread = std::acos(std::clamp(bounds.cosSpread, -1.0f, 1.0f));
   const float emit = std::acos(std::clamp(bounds.cosEmit, -1.0f, 1.0f));
@@ -132,6 +132,7 @@ Split bestSplit(std::span<const LightBounds> lights, std::span<const std::uint32
 
 }  // namespace
 
+/// Returns u with random bits below those that a float holds: halving an interval over and over would run out of them.
 [[gnu::always_inline]] static inline double refined(float u, const Vec3& p) {
   std::uint32_t bits = hashBits(std::bit_cast<std::uint32_t>(u));
   bits = hashCombine(bits, std::bit_cast<std::uint32_t>(p.x));
@@ -139,7 +140,6 @@ Split bestSplit(std::span<const LightBounds> lights, std::span<const std::uint32
   bits = hashCombine(bits, std::bit_cast<std::uint32_t>(p.z));
   return static_cast<double>(u) + static_cast<double>(bits) * 0x1p-56;
 }
-double refine(float u, const Vec3& p) { return refined(u, p); }
 
 LightTree::LightTree(std::span<const LightBounds> lights) {
   leafOf_.assign(lights.size(), kNone);
@@ -191,7 +191,7 @@ template <bool kOpen>
 [[gnu::always_inline]] inline float LightTree::importanceOf(const Group& group, const LightQuery& query) {
   const Vec3 toCentre = group.centre - query.p;
   const float distance2 = glm::dot(toCentre, toCentre);
-  // From inside of the bounding sphere lights may lie in any direction and shine from any side.
+  // Seen from inside of the bounding sphere, lights may lie in any direction and shine from any side.
   const bool isOutside = distance2 > group.radius2;
   const float inside =
       pick(group.radius2 > 0.0f, kAnySide * group.power / pick(group.radius2 > 0.0f, group.radius2, 1.0f), 0.0f);
@@ -210,7 +210,7 @@ template <bool kOpen>
   const bool reaches = !(glm::dot(outside, outside) > group.reach * group.reach);
   const float cosTheta = within(glm::dot(query.n, wi), -1.0f, 1.0f);
   const float most = lessened({cosTheta, sineOf(cosTheta)}, around).cosine;
-  // As for directions: the tilted basis vectors need light at grazing angles.
+  // The tilted basis vectors need light at grazing angles, too, so the weight is that of gather directions.
   const float bySide = pick(most > 0.0f, 1.0f + 2.0f * most, 0.0f);
   const bool anySide = (query.n.x == 0.0f) & (query.n.y == 0.0f) & (query.n.z == 0.0f);
   return pick(reaches, pick(isOutside, importance * pick(anySide, kAnySide, bySide), inside), 0.0f);
@@ -240,7 +240,6 @@ struct alignas(64) LightTree::GroupLanes {
   }
 };
 
-/// As choose(), for all lanes.
 template <bool kOpen>
 [[gnu::always_inline]] inline void LightTree::descendLanes(const Group* groups, const Vec3Lanes& p, const Vec3Lanes& n,
                                                            const LaneFlags& active, const float* u, Descent& descent) {

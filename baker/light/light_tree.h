@@ -16,7 +16,7 @@
 
 namespace lumel {
 
-/// Bounds on where a light, or a group of lights, lies and where to it shines.
+/// Bounds where a light, or a group of lights, lies and where to it shines.
 struct LightBounds {
   Vec3 min{0};  // world
   Vec3 max{0};
@@ -42,7 +42,7 @@ class LightTree {
   explicit LightTree(std::span<const LightBounds> lights);
 
   bool empty() const { return nodes_.empty(); }
-  /// All lights that can be chosen, in their order, where one leaf holds them; else nothing.
+  /// Returns all lights that can be chosen, in their order, where one leaf holds them; else nothing.
   std::span<const std::uint32_t> onlyLeaf() const {
     return nodes_.size() == 1 ? std::span<const std::uint32_t>(order_) : std::span<const std::uint32_t>();
   }
@@ -51,23 +51,21 @@ class LightTree {
     std::uint32_t light = 0;
     float probability = 0.0f;  // 0: nothing can arrive
   };
-  /// u in [0, 1). Among the few lights of a leaf `importance(light)` >= 0 decides, which must not be zero for a light
-  /// that brings anything. The probabilities of all lights add up to 1, or to less where whole leaves turn out to
-  /// bring nothing.
-  template <class Importance>
-  Choice choose(const LightQuery& query, float u, Importance importance) const;
-
-  /// The same for all lanes that are `active`, in two steps: down to a leaf together, and then lane by lane.
+  /// Says where the lanes' descents have ended.
   struct Descent {
     alignas(64) double rest[kLanes];
     alignas(64) float probability[kLanes];  // 0: nothing can arrive
     alignas(64) int leaf[kLanes];
   };
-  /// `n` null leaves the sides open.
+  /// The first step of a choice by u in [0, 1): all lanes that are `active` go down to a leaf together.
+  /// A null `n` leaves the sides open.
   void descend(const Vec3Lanes& p, const Vec3Lanes* n, const LaneFlags& active, const float* u, Descent& descent) const;
-  /// The lights of each lane's leaf, or kNoLight where it has fewer or nothing can arrive.
+  /// Finds the lights of each lane's leaf, or kNoLight where it has fewer or nothing can arrive.
   static constexpr int kNoLight = -1;
   void lightsOf(const Descent& descent, std::array<LaneFlags, kLeaf>& lights) const;
+  /// The second step: among the few lights of a lane's leaf `importance(light)` >= 0 decides, which must not be zero
+  /// for a light that brings anything. The probabilities of all lights add up to 1, or to less where whole leaves turn
+  /// out to bring nothing.
   template <class Importance>
   Choice chooseInLeaf(const Descent& descent, std::size_t lane, Importance importance) const {
     if (!(descent.probability[lane] > 0.0f)) return {};
@@ -75,16 +73,16 @@ class LightTree {
                         descent.probability[lane], importance);
   }
 
-  /// With which choose() takes `light`: to rounding.
+  /// Returns the probability with which the two steps choose `light`, to rounding.
   template <class Importance>
   float probability(const LightQuery& query, std::uint32_t light, Importance importance) const;
 
-  /// An estimate of what all lights together bring, for weighing the tree against other lights.
+  /// Estimates what all lights together bring, for weighing the tree against other lights.
   float importance(const LightQuery& query) const;
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffu;
-  /// LightBounds, ready to be asked. A row of 16 floats, to be turned into lanes.
+  /// LightBounds as the descent reads them: a row of 16 floats, to be turned into lanes.
   struct alignas(64) Group {
     Vec3 centre{0};
     float radius2 = 0.0f;  // of the bounding sphere
@@ -96,7 +94,7 @@ class LightTree {
     float cosEmit = 0.0f;
     int right = 0;  // child; the left one follows its parent; 0: a leaf
   };
-  /// One for each lane, in the same order.
+  /// Holds a group for each lane, with members in the same order.
   struct GroupLanes;
   struct Node {
     std::uint32_t parent = kNone;
@@ -104,10 +102,10 @@ class LightTree {
     std::uint32_t count = 0;  // 0: not a leaf
   };
   std::uint32_t rightOf(std::uint32_t node) const { return static_cast<std::uint32_t>(groups_[node].right); }
-  /// `kOpen`: for queries without a normal, of lights that reach everywhere.
+  /// `kOpen` is for queries without a normal and lights that reach everywhere.
   template <bool kOpen = false>
   static float importanceOf(const Group& group, const LightQuery& query);
-  /// Of a node's children.
+  /// Returns the importances of a node's children.
   std::array<float, 2> importancesBelow(std::uint32_t node, const LightQuery& query) const;
   template <bool kOpen>
   static void descendLanes(const Group* groups, const Vec3Lanes& p, const Vec3Lanes& n, const LaneFlags& active,
@@ -130,39 +128,11 @@ class LightTree {
   std::vector<std::uint32_t> leafOf_;  // per light; kNone: never chosen
 };
 
-/// u with random bits below those that a float holds: halving an interval over and over would run out of them.
-double refine(float u, const Vec3& p);
-
 template <class Importance>
 float LightTree::leafImportances(const Node& leaf, Importance importance, std::array<float, kLeaf>& each) const {
   float total = 0.0f;
   for (std::uint32_t i = 0; i < leaf.count; ++i) total += each[i] = importance(order_[leaf.first + i]);
   return total;
-}
-
-template <class Importance>
-LightTree::Choice LightTree::choose(const LightQuery& query, float u, Importance importance) const {
-  if (empty()) return {};
-  std::uint32_t at = 0;
-  float probability = 1.0f;
-  double rest = nodes_[0].count > 0 ? static_cast<double>(u) : refine(u, query.p);
-  while (nodes_[at].count == 0) {
-    const auto [left, right] = importancesBelow(at, query);
-    if (!(left + right > 0.0f)) return {};
-    const float share = left / (left + right);
-    const auto border = static_cast<double>(share);
-    // (Rounding may bring the rest to 1.)
-    if (rest < border || !(right > 0.0f)) {
-      rest /= border;
-      probability *= share;
-      at = at + 1;
-    } else {
-      rest = (rest - border) / (1.0 - border);
-      probability *= 1.0f - share;
-      at = rightOf(at);
-    }
-  }
-  return chooseInLeaf(nodes_[at], rest, probability, importance);
 }
 
 template <class Importance>

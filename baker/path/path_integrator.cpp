@@ -9,16 +9,16 @@
 namespace lumel {
 namespace {
 
-/// Bounces after which paths may end by Russian roulette.
+/// Paths may end by Russian roulette after this many bounces.
 constexpr int kRouletteAfter = 4;
 
-/// Sample patterns of a texel: the first receiver's, then a block for every hit.
+/// The sample patterns of a texel: a block for the first receiver, then one for every hit.
 constexpr std::uint32_t kFootprint = kLightPatterns;
 constexpr std::uint32_t kDirection = kLightPatterns + 1;
 constexpr std::uint32_t kRoulette = kLightPatterns + 2;
 constexpr std::uint32_t kPatternsPerReceiver = kLightPatterns + 4;
 
-/// The state of one sample's path in one lane.
+/// Holds the state of one sample's path in one lane.
 struct Path {
   Frame frame;            // of the texel's point
   Vec3 gatherTangent{0};  // direction of the gather ray
@@ -51,7 +51,7 @@ class WaveTracer {
   void addLight(int lane, const Vec3& dirTangent, const Vec3& radianceOverPdf);
   void finishSample();
   Receiver receiverAt(const SurfacePoint& point) const;
-  /// Whether what shines by itself does not count for a ray.
+  /// Tells whether what shines by itself does not count for a ray.
   bool leavesOut(int depth) const { return depth == 0 && options_.indirectOnly; }
 
   const LightTransport& transport_;
@@ -78,10 +78,10 @@ WaveResult WaveTracer::run(std::uint32_t pageIndex, const PageTexels& page, std:
   const auto samples = static_cast<std::uint32_t>(options_.samples);
   for (std::uint32_t begin = 0; begin < samples;) {
     const NetRange range = netAt(begin, samples);
-    if (options_.stratumOrder) net_.fill(samplers_, covered_, range, kDirection);
+    net_.fill(samplers_, covered_, range, kDirection);
     for (std::uint32_t step = 0; step < range.count(); ++step) {
       for (std::size_t lane = 0; lane < kLanes; ++lane)
-        samples_.setSample(static_cast<int>(lane), options_.stratumOrder ? net_.sample(step, lane) : begin + step);
+        samples_.setSample(static_cast<int>(lane), net_.sample(step, lane));
       startSample();
       if (!options_.indirectOnly) lightTexels();
       followPaths();
@@ -106,7 +106,7 @@ void WaveTracer::startTexels(std::uint32_t pageIndex, const PageTexels& page, st
   }
 }
 
-/// As WavePoints draws them.
+/// Makes a receiver of a point as WavePoints does for the gather: on round things its rays start over the facet.
 Receiver WaveTracer::receiverAt(const SurfacePoint& point) const {
   const Surface& surface = atlas_.surfaces[point.triangle.surface];
   const std::uint32_t* corner = surface.indices.data() + std::size_t{3} * point.triangle.triangle;
@@ -122,7 +122,7 @@ Receiver WaveTracer::receiverAt(const SurfacePoint& point) const {
   if (!isRounded(receiver.ng, e1, e2, normals)) return receiver;
   const Vec3 lift =
       liftToRound(point.position - corners[0], e1, e2, {point.barycentric.y, point.barycentric.z}, normals);
-  if (!(glm::dot(lift, receiver.ng) > offsetDistance(corners, translation))) return receiver;
+  if (!isLifted(lift, receiver.ng, offsetDistance(corners, translation))) return receiver;
   receiver.rayStart += lift;
   receiver.ng = receiver.ns;
   return receiver;
@@ -171,7 +171,7 @@ void WaveTracer::addLight(int lane, const Vec3& dirTangent, const Vec3& radiance
 }
 
 void WaveTracer::lightTexels() {
-  result_.shadowRays += directLight(transport_, lanes_, samples_, 0, options_.gatherMode, kGatherDensity,
+  result_.shadowRays += directLight(transport_, lanes_, samples_, 0, TraceMode::Packet, kGatherDensity,
                                     [&](int lane, const Vec3& wi, const Vec3& light) {
                                       addLight(lane, paths_[static_cast<std::size_t>(lane)].frame.toLocal(wi), light);
                                     });
@@ -179,14 +179,14 @@ void WaveTracer::lightTexels() {
 
 void WaveTracer::followPaths() {
   for (int depth = 0;; ++depth) {
-    transport_.rays.intersect(rays_, depth == 0 ? options_.gatherMode : options_.bounceMode);
+    transport_.rays.intersect(rays_, TraceMode::Packet);
     findHits(depth);
     for (int lane = 0; lane < kLanes; ++lane)
       lanes_.active[static_cast<std::size_t>(lane)] = rays_.valid[lane] != 0 && shadeHit(lane, depth);
     if (depth >= kRouletteAfter) endDarkPaths(depth);
     if (std::none_of(lanes_.active.begin(), lanes_.active.end(), [](bool active) { return active; })) break;
     const std::uint32_t pattern = static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver;
-    result_.shadowRays += directLight(transport_, lanes_, samples_, pattern, options_.bounceMode, kCosineDensity,
+    result_.shadowRays += directLight(transport_, lanes_, samples_, pattern, TraceMode::Packet, kCosineDensity,
                                       [&](int lane, const Vec3& wi, const Vec3& light) {
                                         Path& path = paths_[static_cast<std::size_t>(lane)];
                                         const float cosTheta =
@@ -208,8 +208,8 @@ void WaveTracer::findHits(int depth) {
     if (rays_.hit(lane)) transport_.materials.findAlbedo(hits_[static_cast<std::size_t>(lane)].point).prefetch();
 }
 
-/// What the ray in flight found: adds what shines by itself. Returns whether the path goes on from there; then
-/// lanes_.receivers holds the point and beta its albedo.
+/// Adds what shines by itself where the ray in flight ended. Returns whether the path goes on from there; then
+/// lanes_.receivers holds the point and beta has been multiplied by its albedo.
 bool WaveTracer::shadeHit(int lane, int depth) {
   const auto l = static_cast<std::size_t>(lane);
   Path& path = paths_[l];
@@ -232,7 +232,7 @@ bool WaveTracer::shadeHit(int lane, int depth) {
   return true;
 }
 
-/// Russian roulette: a path that goes on speaks for those that ended.
+/// Ends paths by Russian roulette: a path that goes on stands for those that ended.
 void WaveTracer::endDarkPaths(int depth) {
   const UnitLanes roulette = samples_.draw1D(static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver + kRoulette);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
@@ -289,7 +289,9 @@ void WaveTracer::finishSample() {
 
 PathIntegrator::PathIntegrator(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
                                const PathOptions& options)
-    : transport_(transport), kernels_(kernels), atlas_(atlas), options_(options) {}
+    : transport_(transport), kernels_(kernels), atlas_(atlas), options_(options) {
+  if (options_.bounces < 0) options_.bounces = kLongestPath;
+}
 
 WaveResult PathIntegrator::bakeWave(std::uint32_t pageIndex, const PageTexels& page, std::size_t first,
                                     std::size_t count) const {

@@ -18,15 +18,12 @@ namespace lumel {
 
 struct PathOptions {
   int samples = 1;
-  int bounces = 0;
+  int bounces = 0;  // -1: all that matter, up to kLongestPath
   bool indirectOnly = false;
   std::uint64_t seed = 1;
-  bool stratumOrder = true;                  // take samples by cell (NetLanes): the same samples, faster rays
-  TraceMode gatherMode = TraceMode::Packet;  // rays and shadow rays from texels
-  TraceMode bounceMode = TraceMode::Packet;  // those from hits
 };
 
-/// What became of one texel of a wave.
+/// Stores the result of a path-traced texel.
 struct TexelResult {
   TexelSums sums;
   float coverage = 0.0f;  // area share; 0: nothing was sampled
@@ -34,6 +31,7 @@ struct TexelResult {
   std::array<Vec3d, kProbeNormals> probes{};  // sums of light on probeNormals(), where probed
 };
 
+/// Stores the results of a wave, texels by lane.
 struct WaveResult {
   std::array<TexelResult, kLanes> texels;
   std::uint64_t rays = 0;

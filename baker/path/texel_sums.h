@@ -8,17 +8,18 @@
 
 namespace lumel {
 
-/// Light of one sample, spread over the maps: each an estimate of irradiance / pi.
+/// Holds the light of one sample, spread over the maps: each an estimate of irradiance / pi.
 struct SampleValue {
   Vec3 flat{0};
   std::array<Vec3, 3> rnm{Vec3(0), Vec3(0), Vec3(0)};
 };
 
+/// Adds up the samples of one texel.
 class TexelSums {
  public:
   static constexpr int kBatches = 16;
 
-  /// `batch` in [0, kBatches): which stretch of the sample sequence the sample belongs to.
+  /// `batch` in [0, kBatches) says which stretch of the sample sequence the sample belongs to.
   void add(const SampleValue& value, int batch) {
     flat_ += value.flat;
     for (std::size_t i = 0; i < 3; ++i) rnm_[i] += value.rnm[i];
@@ -33,11 +34,11 @@ class TexelSums {
   }
 
   std::uint32_t count() const { return count_; }
-  /// Means over the samples that were added; zero where there are none.
+  /// Returns the means over the samples that were added; zero where there are none.
   SampleValue mean() const;
-  /// Share of gather rays that met no back face of a single-sided surface; 1 where none was traced.
+  /// Returns the share of gather rays that met no back face of a single-sided surface; 1 where none was traced.
   float validity() const;
-  /// Luminance of the mean over the batches before `batch`; 0 where they have no samples.
+  /// Returns the luminance of the mean over the batches before `batch`; 0 where they have no samples.
   float luminanceBefore(int batch) const;
 
  private:

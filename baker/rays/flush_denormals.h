@@ -5,8 +5,8 @@
 
 namespace lumel {
 
-/// Denormals are flushed on this thread while it lives: they are far below any light that a map can show and slow rays
-/// down.
+/// Makes this thread flush denormals to zero while the object lives. Denormals are far below any light that a map can
+/// show, and they slow rays down.
 class FlushDenormals {
  public:
   FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040u); }  // FTZ | DAZ

@@ -20,7 +20,7 @@ namespace lumel {
 [[gnu::always_inline]] inline Vec3 pick(bool condition, const Vec3& a, const Vec3& b) {
   return {pick(condition, a.x, b.x), pick(condition, a.y, b.y), pick(condition, a.z, b.z)};
 }
-/// std::clamp by value.
+/// Clamps x like std::clamp, by value.
 [[gnu::always_inline]] inline float within(float x, float least, float most) {
   const float low = x < least ? least : x;
   return low < most ? low : most;
@@ -29,7 +29,7 @@ namespace lumel {
 /// Texels that advance in step: one lane each, one packet per ray call.
 inline constexpr int kLanes = 16;
 
-/// As wide as a float, so that both fit into one loop.
+/// One flag or index for each lane, as wide as a float so that both fit into one loop.
 using LaneFlags = std::array<int, kLanes>;
 
 struct alignas(64) Vec3Lanes {
@@ -62,10 +62,10 @@ inline void forEachLane(std::uint32_t lanes, Body body) {
   for (; lanes != 0; lanes &= lanes - 1) body(static_cast<std::size_t>(std::countr_zero(lanes)));
 }
 
-/// 32-bit values side by side.
+/// Holds Count 32-bit values side by side.
 template <int Count>
 using Words __attribute__((vector_size(4 * Count))) = std::uint32_t;
-/// One for each lane.
+/// Holds one 32-bit value for each lane.
 using LaneWords = Words<kLanes>;
 
 template <std::size_t... I>
@@ -74,7 +74,7 @@ template <std::size_t... I>
   both = __builtin_shufflevector(a, b, I...);
 }
 
-/// Rows of Count words one after another, `row(lane)` pointing to each, from `lane` on.
+/// Joins rows of Count words into one vector, from the row of `lane` on; `row(lane)` points to each.
 template <int Count, int Total, class Row>
 [[gnu::always_inline]] inline void joinRows(Row row, std::size_t lane, Words<Total>& joined) {
   if constexpr (Count == Total) {
@@ -87,7 +87,8 @@ template <int Count, int Total, class Row>
   }
 }
 
-/// From a row of Count words for each lane to Count words of each lane. Loops over rows take them value by value.
+/// Transposes a row of Count words for each lane into Count vectors that hold a word of each lane. Plain loops over
+/// rows would be compiled to scalar moves.
 template <int Count, class Row>
 [[gnu::always_inline]] inline void turnRows(Row row, std::array<LaneWords, Count>& columns) {
   static_assert(Count == 2 || Count == 4 || Count == 8);
@@ -103,7 +104,7 @@ template <int Count, class Row>
   }
 }
 
-/// The first Count words of the record that each lane names, as Count rows of lanes from `lanes` on.
+/// Loads the first Count words of the record that each lane names and stores them as Count rows of lanes at `lanes`.
 template <int Count = kLanes, class Record>
 [[gnu::always_inline]] inline void turnRecords(const Record* records, const LaneFlags& which, void* lanes) {
   static_assert(sizeof(Record) >= 4 * Count);

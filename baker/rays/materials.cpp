@@ -33,7 +33,7 @@ float applyAlphaMode(const Material& material, float alpha) {
 
 }  // namespace
 
-/// Of the triangle that a point lies on.
+/// Returns the area in texture space of the triangle that a point lies on.
 static float uvAreaOf(const TrianglePoint& point, int uvSet) {
   const auto cornerAt = [&](Vec2 barycentric) { return uvAt({point.primitive, point.triangle, barycentric}, uvSet); };
   const Vec2 first = cornerAt({0, 0}), e1 = cornerAt({1, 0}) - first, e2 = cornerAt({0, 1}) - first;

@@ -12,7 +12,7 @@
 
 namespace lumel {
 
-/// A point of a primitive: weights of the triangle's vertices 1 and 2.
+/// A point of a primitive, given by the barycentric weights of the triangle's vertices 1 and 2.
 struct TrianglePoint {
   const Primitive* primitive = nullptr;
   std::uint32_t triangle = 0;
@@ -28,9 +28,9 @@ class Materials {
 
   const Material& material(int index) const { return scene_->materials[static_cast<std::size_t>(index)]; }
 
-  /// Share of light reflected, 0..1: base colour times texture times vertex colour.
+  /// Returns the share of light that is reflected, 0..1: base colour times texture times vertex colour.
   Vec3 albedo(const TrianglePoint& point) const { return albedo(findAlbedo(point)); }
-  /// In two steps, to ask memory for what the second will read.
+  /// albedo() in two steps, so that memory can be asked early for what the second step reads.
   struct AlbedoLookup {
     Vec3 factor{0};
     const Texture* texture = nullptr;
@@ -44,26 +44,28 @@ class Materials {
     return findAlbedo(point, albedoTexture(point.primitive->material, 0.0f));
   }
   static Vec3 albedo(const AlbedoLookup& lookup);
-  /// `texture`: albedoTexture() of the point's material.
+  /// `texture` is albedoTexture() of the point's material.
   AlbedoLookup findAlbedo(const TrianglePoint& point, const Texture* texture) const;
-  /// Holds means of the base colour map over roughly `uvWidth` on a side; null: there is no map.
+  /// Returns the base colour map's level that holds means over roughly `uvWidth` on a side, or null where there is no
+  /// map.
   const Texture* albedoTexture(int material, float uvWidth) const;
-  /// How wide `share` of a point's triangle is in the texture, as a square.
+  /// Returns the side of a square in the texture that has `share` of the area of the point's triangle.
   float albedoWidth(const TrianglePoint& point, float share) const;
-  /// Whether albedo() is the same on all of the primitive.
+  /// Tells whether albedo() is the same on all of the primitive.
   bool hasOneAlbedo(const Primitive& primitive) const {
     return primitive.colors.empty() && colorTexture(primitive.material) == nullptr;
   }
-  /// Radiance sent out from the front (and from the back where doubleSided): nits. Alpha is not applied.
+  /// Returns the radiance in nits that is sent out from the front (and from the back where doubleSided). Alpha is not
+  /// applied.
   Vec3 emission(const TrianglePoint& point) const;
-  /// 0..1: for MASK 0 or 1 (the cut-off applied), for BLEND the share of light that is held.
+  /// Returns 0 or 1 for MASK (the cut-off applied), and for BLEND the share of light that is held, 0..1.
   float opacity(const TrianglePoint& point) const;
 
   /// An unlit material shows its base colour, which is not light: it emits nothing.
   bool emits(int index) const { return material(index).emission != Vec3(0.0f) && !material(index).unlit; }
-  /// Whether opacity varies over the primitive or is partial, so that rays must ask for it.
+  /// Tells whether opacity varies over the primitive or is partial, so that rays must ask for it.
   bool needsAlphaTest(const Primitive& primitive) const;
-  /// Whether no ray can ever hit the primitive.
+  /// Tells whether no ray can ever hit the primitive.
   bool invisible(const Primitive& primitive) const;
 
  private:
@@ -74,7 +76,7 @@ class Materials {
   std::vector<std::optional<TexturePyramid>> srgbByImage_;  // per Scene::images
 };
 
-/// Interpolated texture coordinates; (0, 0) where the primitive lacks the set.
+/// Interpolates texture coordinates. Returns (0, 0) where the primitive lacks the set.
 Vec2 uvAt(const TrianglePoint& point, int uvSet);
 
 }  // namespace lumel

@@ -7,7 +7,7 @@
 
 namespace lumel {
 
-/// A sample left out because it was not finite.
+/// Names a sample that was left out because it was not finite.
 struct NonFiniteSample {
   std::uint32_t page = 0;
   TexelCoord texel;

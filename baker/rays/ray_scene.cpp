@@ -4,6 +4,7 @@
 #include <bit>
 #include <limits>
 
+#include "lightmap/texels/vertex_normal.h"
 #include "scene/base/check.h"
 #include "scene/base/sobol.h"
 
@@ -32,7 +33,7 @@ float rayHash(RTCRayN* ray, unsigned int rays, unsigned int lane, std::uint32_t 
   return unitFloat(h);
 }
 
-/// What is the same for all rays.
+/// Sets the fields that are the same for all rays.
 void initRays(RTCRay16& ray) {
   std::fill(std::begin(ray.tnear), std::end(ray.tnear), 0.0f);
   std::fill(std::begin(ray.time), std::end(ray.time), 0.0f);
@@ -269,7 +270,7 @@ float RayScene::translationOf(int instance) const {
   return byEmbree ? maxAbs(Vec3(placed.worldFromObject[3])) : 0.0f;
 }
 
-/// Of a vertex, in world space.
+/// Returns a vertex in world space.
 static Vec3 corner(const ScenePart& part, std::uint32_t vertex) {
   const Vec3& position = part.positions[vertex];
   return part.isWorld ? position : Vec3(part.worldFromObject * Vec4(position, 1.0f));
@@ -318,7 +319,6 @@ void RayScene::set(HitCornerLanes& lanes, std::size_t lane, const HitCorners& hi
 
 LUMEL_FOR_EACH_CPU void receiveAt(const HitCornerLanes& hits, Vec3Lanes& p, Vec3Lanes& ng, Vec3Lanes& ns,
                                   Vec3Lanes& rayStart) {
-  constexpr float kMostFinite = std::numeric_limits<float>::max();
 #pragma GCC ivdep
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const bool active = hits.active[lane] != 0;
@@ -332,14 +332,12 @@ LUMEL_FOR_EACH_CPU void receiveAt(const HitCornerLanes& hits, Vec3Lanes& p, Vec3
     const Vec3 own = (1.0f - u - v) * hits.normals[0][lane] + u * hits.normals[1][lane] + v * hits.normals[2][lane];
     const Vec3 n = hits.worldFromNormal[0][lane] * own.x + hits.worldFromNormal[1][lane] * own.y +
                    hits.worldFromNormal[2][lane] * own.z;
-    const float length2 = glm::dot(n, n);
-    const bool isSmooth = (length2 > 0.0f) & (length2 <= kMostFinite);
-    const Vec3 unit = n / std::sqrt(pick(isSmooth, length2, 1.0f));
+    const Vec3 unit = unitNormalOr(n, facing, 0.0f);
     const Vec3 turned = pick(glm::dot(unit, facing) < 0.0f, -unit, unit);
     const Vec3 start = offsetPoint(at, facing, corners, hits.translation[lane]);
     p.set(lane, pick(active, at, Vec3(0.0f)));
     ng.set(lane, pick(active, facing, Vec3(0.0f)));
-    ns.set(lane, pick(active, pick(isSmooth, turned, facing), Vec3(0.0f)));
+    ns.set(lane, pick(active, turned, Vec3(0.0f)));
     rayStart.set(lane, pick(active, start, Vec3(0.0f)));
   }
 }
@@ -370,9 +368,8 @@ Vec3 RayScene::shadingNormal(const HitSurface& hit) const {
   const Vec2 b = hit.point.barycentric;
   const Vec3 n = part.worldFromNormal * ((1.0f - b.x - b.y) * part.normals[index[0]] + b.x * part.normals[index[1]] +
                                          b.y * part.normals[index[2]]);
-  const float length2 = glm::dot(n, n);
-  if (!(length2 > 0.0f) || !std::isfinite(length2)) return hit.ng;
-  const Vec3 unit = n / std::sqrt(length2);
+  // The instance may have shrunk them: every length counts.
+  const Vec3 unit = unitNormalOr(n, hit.ng, 0.0f);
   return glm::dot(unit, hit.ng) < 0.0f ? -unit : unit;
 }
 

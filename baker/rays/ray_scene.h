@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "baker/rays/materials.h"
+#include "baker/rays/ray_start.h"
 #include "baker/rays/sample_lanes.h"
 #include "scene/base/embree.h"
 #include "scene/base/expected.h"
@@ -30,12 +30,12 @@ enum class TraceMode {
              // and no instances that Embree places: in their space a direction may have any
 };
 
-/// Up to 16 rays that look for their closest hit. Lanes that are not set are not traced.
+/// Holds up to 16 rays that look for their closest hit. Lanes that are not set are not traced.
 struct alignas(64) RayPacket {
   RTCRayHit16 rayhit;
   alignas(64) int valid[kLanes];
 
-  /// No lane is set; what is the same for all rays is.
+  /// Sets no lane, and the fields that are the same for all rays.
   RayPacket();
   void clear();
   void set(int lane, const Vec3& origin, const Vec3& dir);
@@ -45,7 +45,7 @@ struct alignas(64) RayPacket {
   bool missed(int lane) const { return valid[lane] != 0 && rayhit.hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID; }
 };
 
-/// Up to 16 rays that ask only whether anything lies between their ends.
+/// Holds up to 16 rays that ask only whether anything lies between their ends.
 struct alignas(64) ShadowPacket {
   RTCRay16 ray;
   alignas(64) int valid[kLanes];
@@ -53,7 +53,7 @@ struct alignas(64) ShadowPacket {
 
   ShadowPacket();
   void clear();
-  /// `length` in units of |dir|.
+  /// `length` is in units of |dir|.
   void set(int lane, const Vec3& origin, const Vec3& dir, float length);
   bool visible(int lane) const { return valid[lane] != 0 && ray.tfar[lane] >= 0.0f; }
 };
@@ -86,7 +86,7 @@ struct HitSurface {
   std::array<Vec3, 3> corners;  // of the triangle, world
 };
 
-/// What a receiver at a hit is made of.
+/// Holds what a receiver at a hit is made of.
 struct HitCorners {
   std::array<Vec3, 3> corners;  // of the triangle, world
   std::array<Vec3, 3> normals;  // of its vertices, as the primitive has them; zero where it has none
@@ -95,7 +95,7 @@ struct HitCorners {
   std::uint32_t part = 0;
 };
 
-/// The same by lane, with what is needed of the part.
+/// Holds HitCorners by lane, with what is needed of the part.
 struct HitCornerLanes {
   LaneFlags active{};
   std::array<Vec3Lanes, 3> corners;
@@ -108,69 +108,15 @@ struct HitCornerLanes {
   alignas(64) float translation[kLanes] = {};
 };
 
-/// Hits as points that receive light: what RayScene::surfaceAt, shadingNormal and rayStart find, to the last bit. Zeros
-/// where no lane is active.
+/// Turns hits into points that receive light, with the same bits as RayScene::surfaceAt, shadingNormal and rayStart.
+/// Lanes that are not active become zeros.
 void receiveAt(const HitCornerLanes& hits, Vec3Lanes& p, Vec3Lanes& ng, Vec3Lanes& ns, Vec3Lanes& rayStart);
-
-/// How far rays start off a triangle: a few units in the last place of the largest coordinate that takes part in
-/// finding a point of it (after Waechter and Binder 2019; without their fixed distance near the origin, so that scenes
-/// of any size work). `translation`: largest coordinate of the instance's translation, for geometry that Embree places
-/// itself; 0 else.
-inline float offsetDistance(const std::array<Vec3, 3>& corners, float translation) {
-  const Vec3 largest = glm::max(glm::max(glm::abs(corners[0]), glm::abs(corners[1])), glm::abs(corners[2]));
-  return 8.0f * std::numeric_limits<float>::epsilon() *
-         (std::max(std::max(largest.x, largest.y), largest.z) + translation);
-}
-
-/// The move that offsetPoint makes; `inwards`: the sum of the vectors to the triangle's corners.
-inline Vec3 rayOffset(const Vec3& ng, const Vec3& inwards, float distance) {
-  const float reach = glm::length(inwards);
-  // At most half the way to the centroid, which lies at inwards / 3.
-  const float share = reach > 6.0f * distance ? distance / reach : 1.0f / 6.0f;
-  return ng * distance + inwards * share;
-}
-
-/// The start of a ray that leaves p, a point of the triangle, on the side of ng. It is moved by offsetDistance along
-/// the normal, so that rounding cannot put it behind the surface, and as far towards the triangle's centroid, so that
-/// it cannot lie beyond a wall that stands on the triangle's edge.
-inline Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const std::array<Vec3, 3>& corners, float translation) {
-  return p +
-         rayOffset(ng, (corners[0] - p) + (corners[1] - p) + (corners[2] - p), offsetDistance(corners, translation));
-}
-
-/// Whether unit normals at a triangle's corners describe a surface that is rounded outwards over it: they spread along
-/// its edges. Where they lean by more than 15 degrees (a box with smooth edges, a basin with eight sides) they are a
-/// look and not a shape: rays that start so far out would miss what stands over the facets.
-inline bool isRounded(const Vec3& ng, const Vec3& e1, const Vec3& e2, const std::array<Vec3, 3>& normals) {
-  constexpr float kLeastCosine = 0.966f;
-  for (const Vec3& normal : normals)
-    if (!(glm::dot(ng, normal) > kLeastCosine)) return false;
-  const std::array<float, 3> spread = {glm::dot(normals[1] - normals[0], e1), glm::dot(normals[2] - normals[0], e2),
-                                       glm::dot(normals[2] - normals[1], e2 - e1)};
-  const float most = std::max({spread[0], spread[1], spread[2]});
-  const float least = std::min({spread[0], spread[1], spread[2]});
-  return most > 1e-4f * std::sqrt(std::max(glm::dot(e1, e1), glm::dot(e2, e2))) && least > -0.01f * most;
-}
-
-/// From a point of a rounded triangle out to the surface that its unit normals describe; zero where that bends inwards.
-/// Rays that start there do not meet the facets of the round thing itself, which would show as steps where its shade
-/// begins (Hanika 2021, "Hacking the Shadow Terminator"). The point lies at `fromFirst` = b.x e1 + b.y e2 from
-/// the first corner.
-inline Vec3 liftToRound(const Vec3& fromFirst, const Vec3& e1, const Vec3& e2, const Vec2& b,
-                        const std::array<Vec3, 3>& normals) {
-  const auto below = [](const Vec3& fromCorner, const Vec3& normal) {
-    const float depth = -glm::dot(fromCorner, normal);
-    return (depth > 0.0f ? depth : 0.0f) * normal;
-  };
-  return (1.0f - b.x - b.y) * below(fromFirst, normals[0]) + b.x * below(fromFirst - e1, normals[1]) +
-         b.y * below(fromFirst - e2, normals[2]);
-}
 
 class RayScene {
  public:
-  /// Most triangles of all instances for meshes that are placed more than once to be flattened to world space, as those
-  /// are that are placed once; else they become Embree instances. Flat ones take 70 bytes a triangle more and spare
-  /// every ray the way into another space: a tenth of a bake's time where most of a scene is instances.
+  /// Meshes that are placed more than once are flattened to world space, as those are that are placed once, while the
+  /// triangles of all instances are no more than this; else they become Embree instances. Flattening takes 70 bytes a
+  /// triangle more and saves a tenth of a bake's time where most of a scene is instances.
   static constexpr std::size_t kMostFlattened = 1'000'000;
 
   /// Keeps references to `scene` and `materials`. Errors: Failed.
@@ -183,7 +129,7 @@ class RayScene {
 
   /// Precondition: rays.hit(lane).
   HitSurface surfaceAt(const RayPacket& rays, int lane) const;
-  /// Index of the part that was hit. Precondition: rays.hit(lane).
+  /// Returns the index of the part that was hit. Precondition: rays.hit(lane).
   std::uint32_t partOf(const RayPacket& rays, int lane) const {
     const RTCHit16& hit = rays.rayhit.hit;
     const std::uint32_t instance = hit.instID[0][lane];
@@ -191,40 +137,41 @@ class RayScene {
     return partOfGeometry_[instance] + hit.geomID[lane];
   }
 
-  /// For receiveAt. Precondition: rays.hit(lane).
+  /// Collects the input of receiveAt. Precondition: rays.hit(lane).
   void cornersAt(const RayPacket& rays, int lane, HitCorners& hit) const;
   void set(HitCornerLanes& lanes, std::size_t lane, const HitCorners& hit) const;
   TrianglePoint pointAt(const RayPacket& rays, int lane) const {
     const RTCHit16& hit = rays.rayhit.hit;
     return {parts_[partOf(rays, lane)].primitive, hit.primID[lane], {hit.u[lane], hit.v[lane]}};
   }
-  /// Brings what these and surfaceAt will read of a triangle closer, one step after the other; of no effect on results.
+  /// Prefetches what these and surfaceAt will read of a triangle, first its indices and then its corners. Results do
+  /// not change.
   void prefetchIndices(std::uint32_t part, std::uint32_t triangle) const {
     __builtin_prefetch(parts_[part].indices + std::size_t{3} * triangle);
   }
   void prefetchCorners(std::uint32_t part, std::uint32_t triangle) const;
 
-  /// Interpolated, on the side of hit.ng; hit.ng itself where the mesh has no usable normal.
+  /// Interpolates the normal and turns it to the side of hit.ng. Returns hit.ng where the mesh has no usable normal.
   Vec3 shadingNormal(const HitSurface& hit) const;
-  /// Where rays that leave the surface start.
+  /// Returns where rays that leave the surface start.
   Vec3 rayStart(const HitSurface& hit) const {
     return offsetPoint(hit.p, hit.ng, hit.corners, parts_[hit.part].translation);
   }
 
   const std::vector<ScenePart>& parts() const { return parts_; }
   std::vector<ScenePart>& parts() { return parts_; }
-  /// Primitive `primitive` of the mesh of an instance.
+  /// Returns primitive `primitive` of the mesh of an instance.
   const Primitive* primitiveOf(int instance, int primitive) const {
     return &scene_->primitive(scene_->instances[static_cast<std::size_t>(instance)].mesh, primitive);
   }
-  /// World-space corners, as wound in the primitive.
+  /// Returns the corners in world space, as wound in the primitive.
   std::array<Vec3, 3> corners(const ScenePart& part, std::uint32_t triangle) const;
 
-  /// For offsetPoint: the largest coordinate of an instance's translation where Embree places it, 0 where its
-  /// triangles are in world space.
+  /// Returns, for offsetPoint, the largest coordinate of an instance's translation where Embree places it, and 0 where
+  /// its triangles are in world space.
   float translationOf(int instance) const;
 
-  /// Whether Embree places any mesh: TraceMode::Coherent is then not allowed.
+  /// Tells whether Embree places any mesh: TraceMode::Coherent is then not allowed.
   bool placesInstances() const {
     return std::any_of(meshScenes_.begin(), meshScenes_.end(), [](const EmbreeScene& s) { return s != nullptr; });
   }
@@ -232,7 +179,7 @@ class RayScene {
   Vec3 boundsMin() const { return boundsMin_; }
   Vec3 boundsMax() const { return boundsMax_; }
   bool empty() const { return parts_.empty(); }
-  /// For benchmarks that call Embree themselves.
+  /// Benchmarks that call Embree themselves use this.
   RTCScene embreeScene() const { return top_.get(); }
   std::size_t alphaTestedParts() const { return alphaTested_.size(); }
 

@@ -20,11 +20,11 @@ struct UnitSquareLanes {
   Vec2 operator[](int lane) const { return {x[lane], y[lane]}; }
 };
 
-/// Gives each lane what TexelSampler::get1D and get2D give for its texel and its sample index.
+/// Gives each lane the numbers that TexelSampler::get1D and get2D give for its texel and its sample index.
 class SampleLanes {
  public:
   void setTexel(int lane, const TexelSampler& sampler) { seeds_[lane] = sampler.seed(); }
-  /// TexelSampler(keys[lane], depths[lane], 0, 0) for all lanes.
+  /// Gives each lane the sampler TexelSampler(keys[lane], depths[lane], 0, 0).
   void setTexels(const std::uint32_t* keys, const std::uint32_t* depths);
   void setSample(int lane, std::uint32_t index) { samples_[lane] = index; }
   void setSampleOfAll(std::uint32_t index) {

@@ -10,8 +10,8 @@
 
 namespace lumel {
 
-/// Cosine and sine of a share of a full turn in [0, 1], to 1e-7: without a call and without branches, so that loops
-/// over lanes become vector code with the same bits on every processor.
+/// Returns cosine and sine of a share of a full turn in [0, 1], to 1e-7: without a call and without branches, so that
+/// loops over lanes become vector code with the same bits on every processor.
 inline Vec2 onUnitCircle(float turn) {
   // The angle from the nearest quarter is at most pi/4, where Taylor's series to the 9th order do.
   const int quarter = static_cast<int>(4.0f * turn + 0.5f);
@@ -31,7 +31,7 @@ inline Vec3 directionFromZ(float z, float turn) {
   return {r * around.x, r * around.y, z};
 }
 
-/// Azimuth of a direction as a share of a full turn, in [0, 1).
+/// Returns the azimuth of a direction as a share of a full turn, in [0, 1).
 inline float turnOf(const Vec3& w) {
   const float turn = std::atan2(w.y, w.x) * (0.5f * kInvPi);
   return turn < 0 ? turn + 1.0f : turn;
@@ -67,7 +67,7 @@ inline Vec2 invertTriangle(Vec2 barycentric) {
   return {root * root, root > 0 ? barycentric.y / root : 0.0f};
 }
 
-/// The angle of (x, y) for y >= 0, in [0, pi], to 2e-7: without a call and without branches. 0 for (0, 0).
+/// Returns the angle of (x, y) for y >= 0, in [0, pi], to 2e-7, without a call and without branches. (0, 0) gives 0.
 [[gnu::always_inline]] inline float angleAbove(float y, float x) {
   const float steep = std::abs(x);
   const float most = pick(steep >= y, steep, y);
@@ -83,8 +83,9 @@ inline Vec2 invertTriangle(Vec2 barycentric) {
 }
 inline double angleAbove(double y, double x) { return std::atan2(y, x); }
 
-/// tan(solidAngle / 2) of a triangle seen from the origin as volume / below, for corners in any order (Van Oosterom and
-/// Strackee 1983). volume = |dot(a, cross(b - a, c - a))|; taken from the edges it is accurate for small triangles.
+/// Returns `below` of tan(solidAngle / 2) = volume / below for a triangle seen from the origin, corners in any order
+/// (Van Oosterom and Strackee 1983). volume = |dot(a, cross(b - a, c - a))|; taken from the edges it is accurate for
+/// small triangles.
 template <class V, class T>
 [[gnu::always_inline]] inline T belowSolidAngle(const V& a, const V& b, const V& c) {
   const T la = glm::length(a);
@@ -93,7 +94,7 @@ template <class V, class T>
   return la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb;
 }
 
-/// 0 where the origin lies in the triangle's plane.
+/// Returns the solid angle of a triangle seen from the origin, or 0 where the origin lies in the triangle's plane.
 template <class V, class T>
 [[gnu::always_inline]] inline T triangleSolidAngle(const V& a, const V& b, const V& c, T volume) {
   const T angle = T(2) * angleAbove(volume > T(0) ? volume : T(0), belowSolidAngle<V, T>(a, b, c));
@@ -111,7 +112,7 @@ struct SphericalTriangleOf {
   T solidAngle() const { return triangleSolidAngle(a, b, c, volume()); }
 
   /// u.x chooses the part cut off by an arc from b to the opposite edge, u.y the place on that arc.
-  /// `angle`: solidAngle(), `volumeOfCorners`: volume(), which a caller may know better.
+  /// `angle` is solidAngle() and `volumeOfCorners` is volume(), which a caller may know better.
   [[gnu::always_inline]] V sample(Vec2 u, T angle, T volumeOfCorners) const {
     // The part is (a, b, end) with end on the arc from a to c. By the formula above its solid angle is `part` where
     // dot(end + a, g) = 0 with g = sin(part/2) (a + b) - cos(part/2) cross(a, b); so half way from a to end lies
@@ -143,18 +144,18 @@ struct SphericalTriangleOf {
 };
 using SphericalTriangle = SphericalTriangleOf<double>;
 
-/// The density with which a surface gathers from a direction above it.
+/// The density with which a surface gathers from a direction above it: constant + perCosine * cosTheta.
 struct SurfaceDensity {
   float constant = 0.0f;
   float perCosine = 0.0f;
   float operator()(float cosTheta) const { return cosTheta > 0.0f ? constant + perCosine * cosTheta : 0.0f; }
 };
-/// That of sampleGatherHemisphere and sampleCosineHemisphere.
+/// The densities of sampleGatherHemisphere and of sampleCosineHemisphere.
 inline constexpr SurfaceDensity kGatherDensity{0.25f * kInvPi, 0.5f * kInvPi};
 inline constexpr SurfaceDensity kCosineDensity{0.0f, kInvPi};
 
-/// Weight of a sample taken with density `pdf` where another technique would take it with `other` (Veach 1997, the
-/// power heuristic with exponent 2, one sample of each). An `other` of zero gives 1, an infinite one 0.
+/// Returns the weight of a sample taken with density `pdf` where another technique would take it with `other` (Veach
+/// 1997, the power heuristic with exponent 2, one sample of each). An `other` of zero gives 1, an infinite one 0.
 inline float misWeight(float pdf, float other) {
   const float ratio = other / pdf;
   return 1.0f / (1.0f + ratio * ratio);

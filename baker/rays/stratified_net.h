@@ -13,24 +13,24 @@
 
 namespace lumel {
 
-/// Most points of one net: 32 x 32 cells.
+/// The most points that one net has: 32 x 32 cells.
 inline constexpr std::uint32_t kMostNetPoints = 1024;
 
-/// An aligned stretch of a sequence: 2^log2Count samples from `first`, a multiple of their number.
+/// An aligned stretch of a sequence. It has 2^log2Count samples from `first` on, which is a multiple of their number.
 struct NetRange {
   std::uint32_t first = 0;
   int log2Count = 0;
   std::uint32_t count() const { return std::uint32_t{1} << log2Count; }
 };
 
-/// The largest net that starts at `first` and does not go past `end`. Precondition: first < end.
+/// Returns the largest net that starts at `first` and does not go past `end`. Precondition: first < end.
 inline NetRange netAt(std::uint32_t first, std::uint32_t end) {
   int log2Count = std::bit_width(std::min(end - first, kMostNetPoints)) - 1;
   if (first != 0) log2Count = std::min(log2Count, std::countr_zero(first));
   return {first, log2Count};
 }
 
-/// Place of a cell among 2^ceil(m/2) x 2^floor(m/2), m being the net's log2Count.
+/// The place of a cell among 2^ceil(m/2) x 2^floor(m/2), where m is the net's log2Count.
 struct NetCell {
   std::uint32_t x = 0;
   std::uint32_t y = 0;
@@ -42,14 +42,14 @@ NetCell netCell(std::uint32_t cell);
 /// scrambling keeps this). Cells are in Morton order, so that one packet's rays are close to those of the next.
 class NetLanes {
  public:
-  /// The points of `pattern`. Lanes that are not `active` hold zeros.
+  /// Draws the points of `pattern`. Lanes that are not `active` hold zeros.
   void fill(const std::array<TexelSampler, kLanes>& samplers, const std::array<bool, kLanes>& active,
             const NetRange& net, std::uint32_t pattern);
 
-  /// kLanes values: the lanes' points in a cell.
+  /// Return kLanes values each: the lanes' points in a cell.
   const float* x(std::uint32_t cell) const { return x_.data() + std::size_t{cell} * kLanes; }
   const float* y(std::uint32_t cell) const { return y_.data() + std::size_t{cell} * kLanes; }
-  /// Index in the sequence.
+  /// Returns a lane's index in the sequence for a cell.
   std::uint32_t sample(std::uint32_t cell, std::size_t lane) const {
     return net_.first + offset_[cell * kLanes + lane];
   }

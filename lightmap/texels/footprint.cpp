@@ -6,6 +6,7 @@
 
 #include "lightmap/raster.h"
 #include "lightmap/texels/texels.h"
+#include "lightmap/texels/vertex_normal.h"
 #include "scene/base/check.h"
 
 namespace lumel {
@@ -222,11 +223,9 @@ SurfacePoint TexelFootprint::pointOn(const Piece& piece, Vec2 barycentric) const
   point.position = Vec3(p0 + static_cast<double>(w1) * edge1 + static_cast<double>(w2) * edge2);
 
   const Vec3 normal = w0 * surface.normals[v[0]] + w1 * surface.normals[v[1]] + w2 * surface.normals[v[2]];
-  const float length2 = glm::dot(normal, normal);
-  const bool isSmooth = length2 > 1e-12f && std::isfinite(length2);
   // A chart never mixes handedness, so neither does a triangle: the interpolated w keeps its sign.
   const Vec4 tangent = w0 * surface.tangents[v[0]] + w1 * surface.tangents[v[1]] + w2 * surface.tangents[v[2]];
-  point.frame = frameFromTangent(isSmooth ? normal / std::sqrt(length2) : source.geometricNormal, tangent);
+  point.frame = frameFromTangent(unitNormalOr(normal, source.geometricNormal), tangent);
   return point;
 }
 

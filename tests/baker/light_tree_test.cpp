@@ -6,7 +6,9 @@
 #include <cmath>
 #include <random>
 
-#include "baker/light/lights.h"
+#include "baker/light/emissive_triangles.h"
+#include "baker/light/punctual_lights.h"
+#include "tests/baker/one_sample.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {
@@ -52,7 +54,20 @@ std::vector<LightBounds> mixture(std::size_t count, Random& random) {
   return lights;
 }
 
-// Lanes in step, some of them without a point, end where each would by itself; a tree of one leaf has no step to take.
+/// What one number chooses.
+template <class Importance>
+LightTree::Choice choose(const LightTree& tree, const LightQuery& query, float u, Importance importance) {
+  Vec3Lanes p, n;
+  p.set(0, query.p);
+  n.set(0, query.n);
+  const std::array<float, kLanes> numbers{u};
+  LightTree::Descent descent;
+  tree.descend(p, query.n == Vec3(0.0f) ? nullptr : &n, {1}, numbers.data(), descent);
+  return tree.chooseInLeaf(descent, 0, importance);
+}
+
+// Lanes in step, some of them without a point, end where each would by itself, with the probability that is stated for
+// their light; a tree of one leaf has no step to take.
 TEST(LightTree, LanesDescendAsSinglePointsDo) {
   Random random(4);
   for (const auto& [count, bounded] : {std::pair{3, true}, std::pair{300, true}, std::pair{300, false}}) {
@@ -75,11 +90,17 @@ TEST(LightTree, LanesDescendAsSinglePointsDo) {
       tree.descend(p, trial % 2 ? &n : nullptr, active, u.data(), descent);
       for (std::size_t lane = 0; lane < kLanes; ++lane) {
         const LightTree::Choice choice = tree.chooseInLeaf(descent, lane, importance);
-        const LightTree::Choice one = tree.choose({p[lane], n[lane]}, u[lane], importance);
-        EXPECT_EQ(choice.probability, active[lane] ? one.probability : 0.0f);
-        if (choice.probability > 0.0f) {
-          EXPECT_EQ(choice.light, one.light);
+        if (!active[lane]) {
+          EXPECT_EQ(choice.probability, 0.0f);
+          continue;
         }
+        const LightQuery query{p[lane], n[lane]};
+        const LightTree::Choice one = choose(tree, query, u[lane], importance);
+        EXPECT_EQ(choice.probability, one.probability);
+        if (!(choice.probability > 0.0f)) continue;
+        EXPECT_EQ(choice.light, one.light);
+        // A product of a dozen shares, rounded.
+        EXPECT_NEAR(tree.probability(query, choice.light, importance) / choice.probability, 1.0f, 1e-5f);
       }
     }
   }
@@ -105,7 +126,7 @@ TEST(LightTree, ProbabilitiesAddUpToOneAndMatchFrequencies) {
     std::vector<int> counts(lights.size());
     int none = 0;
     for (int i = 0; i < kSamples; ++i) {
-      const LightTree::Choice choice = tree.choose(query, random.unit(), even);
+      const LightTree::Choice choice = choose(tree, query, random.unit(), even);
       if (!(choice.probability > 0.0f)) {
         ++none;
         continue;
@@ -137,11 +158,10 @@ TEST(LightTree, Degenerate) {
   const auto even = [](std::uint32_t) { return 1.0f; };
   const LightQuery query{{0, 0, 0}, {0, 1, 0}};
   EXPECT_TRUE(LightTree().empty());
-  EXPECT_EQ(LightTree().choose(query, 0.5f, even).probability, 0.0f);
   EXPECT_EQ(LightTree().importance(query), 0.0f);
 
   const std::vector<LightBounds> one = {pointAt({0, 1, 0})};
-  EXPECT_EQ(LightTree(one).choose(query, 0.999f, even).probability, 1.0f);
+  EXPECT_EQ(choose(LightTree(one), query, 0.999f, even).probability, 1.0f);
   EXPECT_EQ(LightTree(one).probability(query, 0, even), 1.0f);
   EXPECT_EQ(LightTree(one).probability(query, 1, even), 0.0f);
 
@@ -149,7 +169,7 @@ TEST(LightTree, Degenerate) {
   std::vector<LightBounds> odd = {pointAt({0, 1, 0}, 0.0f), pointAt({0, 1, 0}, -1.0f),
                                   pointAt({0, 1, 0}, std::nanf("")), pointAt({0, 1, 0}, INFINITY),
                                   pointAt({0, 1, 0}, 2.0f)};
-  EXPECT_EQ(LightTree(odd).choose(query, 0.0f, even).light, 4u);
+  EXPECT_EQ(choose(LightTree(odd), query, 0.0f, even).light, 4u);
   EXPECT_EQ(LightTree(odd).probability(query, 0, even), 0.0f);
   odd.pop_back();
   EXPECT_TRUE(LightTree(odd).empty());
@@ -163,9 +183,9 @@ TEST(LightTree, Degenerate) {
 
   // Light below the surface, and light at the very point.
   const std::vector<LightBounds> below(100, pointAt({0, -1, 0}));
-  EXPECT_EQ(LightTree(below).choose(query, 0.5f, even).probability, 0.0f);
+  EXPECT_EQ(choose(LightTree(below), query, 0.5f, even).probability, 0.0f);
   const std::vector<LightBounds> here(100, pointAt({0, 0, 0}));
-  EXPECT_EQ(LightTree(here).choose(query, 0.5f, even).probability, 0.0f);
+  EXPECT_EQ(choose(LightTree(here), query, 0.5f, even).probability, 0.0f);
 
   // Ever closer together: as deep as trees get.
   std::vector<LightBounds> row;
@@ -191,8 +211,31 @@ Light randomLight(Random& random, int kind) {
   return light;
 }
 
-// The mean over u of what samples bring is the sum over all lights: none is left out, and the densities are exact. The
-// midpoints of a fine grid stand for all u.
+/// The mean over u of what one sample brings to a point, the directional lights' left out where `near`. The midpoints
+/// of a fine grid stand for all u.
+double meanBrought(const PunctualLights& lights, const Vec3& p, const Vec3& n, bool near) {
+  constexpr int kGrid = 1 << 18;
+  LaneFlags active;
+  active.fill(1);
+  Vec3Lanes points, normals;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    points.set(lane, p);
+    normals.set(lane, n);
+  }
+  const ReceiverLanes at{active, points, normals, normals, points};
+  double sum = 0;
+  for (int i = 0; i < kGrid; i += kLanes) {
+    UnitLanes u;
+    for (int lane = 0; lane < kLanes; ++lane) u.u[lane] = (static_cast<float>(i + lane) + 0.5f) / kGrid;
+    LightSampleLanes samples;
+    near ? lights.sampleNear(at, u, samples) : lights.sample(at, u, samples);
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      sum += static_cast<double>(samples.weight.x[lane] * std::max(0.0f, glm::dot(samples.wi[lane], n))) / kGrid;
+  }
+  return sum;
+}
+
+// The mean over u of what samples bring is the sum over all lights: none is left out, and the densities are exact.
 TEST(PunctualLights, ManyLightsAgreeWithTheSum) {
   Random random(7);
   for (const int count : {1, 5, 32, 33, 100, 2000}) {
@@ -211,15 +254,7 @@ TEST(PunctualLights, ManyLightsAgreeWithTheSum) {
         truth += brought;
         if (light.type != LightType::Directional) near += brought;
       }
-      constexpr int kGrid = 1 << 18;
-      double sum = 0, sumNear = 0;
-      for (int i = 0; i < kGrid; ++i) {
-        const float u = (static_cast<float>(i) + 0.5f) / kGrid;
-        const LightSample s = all.sample(p, n, u);
-        sum += static_cast<double>(s.weight.x * std::max(0.0f, glm::dot(s.wi, n))) / kGrid;
-        const LightSample t = all.sampleNear(p, n, u);
-        sumNear += static_cast<double>(t.weight.x * std::max(0.0f, glm::dot(t.wi, n))) / kGrid;
-      }
+      const double sum = meanBrought(all, p, n, false), sumNear = meanBrought(all, p, n, true);
       // A light's share of u is met to one step of the grid; weights are a few times the mean.
       EXPECT_NEAR(sum, truth, 2e-3 * truth + 1e-6) << count << " lights";
       EXPECT_NEAR(sumNear, near, 2e-3 * near + 1e-6) << count << " lights";
@@ -232,17 +267,17 @@ TEST(PunctualLights, ManyDegenerate) {
   light.position = {0, 1, 0};
   const Vec3 up(0, 1, 0);
   const PunctualLights pile(std::vector<Light>(1000, light));
-  EXPECT_NEAR(pile.sample({0, 0, 0}, up, 0.3f).weight.x, 1000.0f, 0.1f);
+  EXPECT_NEAR(sampleOne(pile, {0, 0, 0}, up, 0.3f).weight.x, 1000.0f, 0.1f);
   // At the very place of all lights, and with all of them behind: nothing, and no NaN.
-  EXPECT_EQ(pile.sample({0, 1, 0}, up, 0.3f).weight, Vec3(0.0f));
-  EXPECT_EQ(pile.sample({0, 2, 0}, up, 0.3f).weight, Vec3(0.0f));
+  EXPECT_EQ(sampleOne(pile, {0, 1, 0}, up, 0.3f).weight, Vec3(0.0f));
+  EXPECT_EQ(sampleOne(pile, {0, 2, 0}, up, 0.3f).weight, Vec3(0.0f));
   std::vector<Light> suns(100, light);
   for (Light& sun : suns) {
     sun.type = LightType::Directional;
     sun.direction = {0, -1, 0};
   }
-  EXPECT_NEAR(PunctualLights(suns).sample({0, 0, 0}, up, 0.7f).weight.x, 100.0f, 0.01f);
-  EXPECT_EQ(PunctualLights(suns).sampleNear({0, 0, 0}, up, 0.7f).weight, Vec3(0.0f));
+  EXPECT_NEAR(sampleOne(PunctualLights(suns), {0, 0, 0}, up, 0.7f).weight.x, 100.0f, 0.01f);
+  EXPECT_EQ(sampleOne(PunctualLights(suns), {0, 0, 0}, up, 0.7f, true).weight, Vec3(0.0f));
 }
 
 /// Many lamps in view of each other, none in the way of another as seen from the floor.
@@ -282,7 +317,7 @@ TEST(EmissiveTriangles, ManyAgreeWithClosedForms) {
       constexpr std::uint32_t kSamples = 1 << 17;
       double sum = 0;
       for (std::uint32_t i = 0; i < kSamples; ++i) {
-        const LightSample s = lamps.lights.sample(p, sobol1D(i, 1), sobol2D(i, 2));
+        const LightSample s = sampleOne(lamps.lights, p, sobol1D(i, 1), sobol2D(i, 2));
         sum += static_cast<double>(s.weight.x * std::max(0.0f, s.wi.y)) / std::numbers::pi / kSamples;
       }
       EXPECT_NEAR(sum / truth, 1.0, 5e-3) << side << " lamps on a side";  // noise: 2e-3 and less

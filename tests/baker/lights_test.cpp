@@ -1,14 +1,15 @@
 // Densities of light sampling: what sample() states must be what pdf() answers for the same direction.
-#include "baker/light/lights.h"
-
 #include <gtest/gtest.h>
 
 #include <limits>
 
+#include "baker/light/emissive_triangles.h"
 #include "baker/light/environment_light.h"
+#include "baker/light/punctual_lights.h"
 #include "baker/rays/sampling.h"
 #include "scene/base/sobol.h"
 #include "scene/images/environment.h"
+#include "tests/baker/one_sample.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {
@@ -38,7 +39,7 @@ TEST(EmissiveTriangles, DensityOfAHitIsThatOfTheSample) {
   double flux = 0;
   constexpr std::uint32_t kSamples = 4096;
   for (std::uint32_t i = 0; i < kSamples; ++i) {
-    const LightSample s = lights.sample(p, sobol1D(i, 1), sobol2D(i, 2));
+    const LightSample s = sampleOne(lights, p, sobol1D(i, 1), sobol2D(i, 2));
     if (s.weight == Vec3(0.0f)) continue;
     RayPacket packet;
     packet.set(0, p, s.wi);
@@ -108,7 +109,7 @@ double sampled(const EnvironmentLight& light, bool sun) {
   constexpr std::uint32_t kSamples = 8192;
   double mean = 0;
   for (std::uint32_t i = 0; i < kSamples; ++i) {
-    const LightSample s = sun ? light.sampleSun(sobol2D(i, 1)) : light.sampleSky(sobol2D(i, 1));
+    const LightSample s = sampleOne(light, sun, sobol2D(i, 1));
     EXPECT_NEAR(glm::length(s.wi), 1.0f, 1e-5f);
     // A direction within rounding of a cell's border may fall into the next one.
     same += std::abs(light.pdf(s.wi) / s.pdf - 1.0f) < 1e-4f;
@@ -182,7 +183,7 @@ TEST(EnvironmentLight, CellsKeepTheLightOfAnyImage) {
   }
 }
 
-TEST(EnvironmentLight, LanesGiveWhatSingleDirectionsDo) {
+TEST(EnvironmentLight, LanesDoNotDependOnEachOther) {
   const Environment sky = patchySky();
   const EnvironmentLight light(sky);
   for (std::uint32_t i = 0; i < 256; ++i) {
@@ -201,7 +202,7 @@ TEST(EnvironmentLight, LanesGiveWhatSingleDirectionsDo) {
       light.arriving(samples.wi, gathered, arriving);
       for (std::size_t lane = 0; lane < kLanes; ++lane) {
         const Vec2 point(u.x[lane], u.y[lane]);
-        const LightSample one = sun ? light.sampleSun(point) : light.sampleSky(point);
+        const LightSample one = sampleOne(light, sun, point);
         EXPECT_EQ(samples.wi[lane], one.wi);
         EXPECT_EQ(samples.weight[lane], one.weight);
         EXPECT_EQ(samples.pdf[lane], one.pdf);
@@ -227,7 +228,7 @@ TEST(EnvironmentLight, NothingIsBuiltWithoutAnImage) {
 }
 
 // For few lights and for a tree of them, with and without the directional ones.
-TEST(PunctualLights, LanesGiveWhatSinglePointsDo) {
+TEST(PunctualLights, LanesDoNotDependOnEachOther) {
   for (const std::size_t count : {5u, 60u}) {
     std::vector<Light> some(count);
     for (std::size_t i = 0; i < count; ++i) {
@@ -255,8 +256,7 @@ TEST(PunctualLights, LanesGiveWhatSinglePointsDo) {
         LightSampleLanes samples;
         near ? lights.sampleNear(at, u, samples) : lights.sample(at, u, samples);
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
-          const LightSample one =
-              near ? lights.sampleNear(p[lane], n[lane], u.u[lane]) : lights.sample(p[lane], n[lane], u.u[lane]);
+          const LightSample one = sampleOne(lights, p[lane], n[lane], u.u[lane], near);
           EXPECT_EQ(samples.weight[lane], one.weight);
           if (one.weight == Vec3(0.0f)) continue;
           EXPECT_EQ(samples.wi[lane], one.wi);
@@ -280,7 +280,7 @@ TEST(PunctualLights, ChoiceIsProportionalToWhatArrives) {
   // Both have the same direction: with u below the near one's share (1 / (1 + 1/9)) it is chosen, and the weight is the
   // sum of both irradiances either way.
   for (const float u : {0.0f, 0.5f, 0.89f, 0.91f, 0.999999f}) {
-    const LightSample s = lights.sample({0, 0, 0}, {0, 1, 0}, u);
+    const LightSample s = sampleOne(lights, {0, 0, 0}, {0, 1, 0}, u);
     EXPECT_EQ(s.target.y, u < 0.9f ? 1.0f : 3.0f);
     EXPECT_NEAR(s.weight.x, 1.0f + 1.0f / 9, 1e-5f);
     EXPECT_EQ(s.pdf, 0.0f);

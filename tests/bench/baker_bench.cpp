@@ -195,12 +195,10 @@ void BM_DirectLight(benchmark::State& state) {
 }
 BENCHMARK(BM_DirectLight);
 
-/// The way down a tree of lights. Arguments: lights; points with a normal, or open to all sides; by lanes, or point by
-/// point.
+/// The way down a tree of lights. Arguments: lights; points with a normal, or open to all sides.
 void BM_LightTree(benchmark::State& state) {
   const auto count = static_cast<int>(state.range(0));
-  const bool hasNormal = state.range(1) != 0, byLanes = state.range(2) != 0;
-  state.SetLabel(byLanes ? "by lanes" : "point by point");
+  const bool hasNormal = state.range(1) != 0;
   const int side = static_cast<int>(std::ceil(std::sqrt(static_cast<float>(count))));
   std::vector<LightBounds> lights;
   for (int i = 0; i < count; ++i) {
@@ -222,18 +220,13 @@ void BM_LightTree(benchmark::State& state) {
       u[lane] = unitFloat(hashCombine(key, static_cast<std::uint32_t>(lane)));
     }
     ++wave;
-    if (byLanes) {
-      LightTree::Descent descent;
-      tree.descend(p, hasNormal ? &n : nullptr, active, u, descent);
-      benchmark::DoNotOptimize(descent);
-    } else {
-      for (std::size_t lane = 0; lane < kLanes; ++lane)
-        benchmark::DoNotOptimize(tree.choose({p[lane], n[lane]}, u[lane], [](std::uint32_t) { return 1.0f; }));
-    }
+    LightTree::Descent descent;
+    tree.descend(p, hasNormal ? &n : nullptr, active, u, descent);
+    benchmark::DoNotOptimize(descent);
   }
   state.SetItemsProcessed(state.iterations() * kLanes);
 }
-BENCHMARK(BM_LightTree)->ArgsProduct({{1000, 100000}, {0, 1}, {0, 1}});
+BENCHMARK(BM_LightTree)->ArgsProduct({{1000, 100000}, {0, 1}});
 
 /// One sample into the sums of a texel, with its projection.
 void BM_Accumulate(benchmark::State& state) {

@@ -1,4 +1,4 @@
-#include "baker/light/lights.h"
+#include "baker/light/punctual_lights.h"
 
 #include <algorithm>
 #include <array>
@@ -8,14 +8,14 @@
 namespace lumel {
 namespace {
 
-/// Radians that a spot's cone is taken for wider, for rounding.
+/// A spot's cone counts as this many radians wider, for rounding.
 constexpr float kConeSlack = 0.02f;
 
 bool sends(const Light& light) {
   return light.intensity > 0.0f && std::max({light.color.x, light.color.y, light.color.z}) > 0.0f;
 }
 
-/// Of a light with a position.
+/// Bounds a light with a position.
 LightBounds boundsOf(const Light& light) {
   LightBounds bounds{.min = light.position, .max = light.position, .cosSpread = -1.0f, .cosEmit = 0.0f};
   bounds.power = luminance(light.color) * light.intensity;
@@ -29,7 +29,7 @@ LightBounds boundsOf(const Light& light) {
   return bounds;
 }
 
-/// Irradiance per power: one over the square of the distance, with the range's window and the cone; nothing at the
+/// Returns irradiance per power: one over the square of the distance, with the range's window and the cone; 0 at the
 /// light itself.
 [[gnu::always_inline]] inline float attenuation(const Vec3& p, const Vec3& position, const Vec3& direction,
                                                 float perRange2, float cosOuter, float perCone, Vec3& wi) {
@@ -49,13 +49,13 @@ LightBounds boundsOf(const Light& light) {
          attenuation(p, light.position, light.direction, light.perRange2, light.cosOuter, light.perCone, wi);
 }
 
-/// For the choice.
+/// Returns what the choice among lights is in proportion to.
 [[gnu::always_inline]] inline float importanceOf(const Vec3& facing, const Vec3& wi, const Vec3& n) {
   const float cosTheta = glm::dot(wi, n);
   return pick(cosTheta > 0.0f, luminance(facing) * (1.0f + 2.0f * cosTheta), 0.0f);
 }
 
-/// Sampled light of one source with a position, for all lanes.
+/// Samples one source with a position for all lanes.
 LUMEL_FOR_EACH_CPU void sampleNearby(const PunctualLights::Source& light, const Vec3Lanes& p,
                                      LightSampleLanes& samples) {
   const PunctualLights::Source from = light;
@@ -113,18 +113,16 @@ PunctualLights::PunctualLights(const std::vector<Light>& lights) {
   tree_ = LightTree(bounds);
 }
 
-LightSample PunctualLights::sampleOne(std::size_t index, const Vec3& p) const {
-  LightSample sample;
-  sample.weight = lights_[index].facing(p, sample.wi);
-  sample.distant = lights_[index].distant;
-  sample.target = lights_[index].position;
-  return sample;
-}
-
 void PunctualLights::sampleOne(std::size_t index, const Vec3Lanes& p, LightSampleLanes& samples) const {
-  if (!lights_[index].distant) return sampleNearby(lights_[index], p, samples);
-  const LightSample sample = sampleOne(index, Vec3(0.0f));
-  for (std::size_t lane = 0; lane < kLanes; ++lane) samples.set(lane, sample);
+  const Source& light = lights_[index];
+  if (!light.distant) return sampleNearby(light, p, samples);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    samples.wi.set(lane, -light.direction);
+    samples.weight.set(lane, light.power);
+    samples.target.set(lane, light.position);
+    samples.pdf[lane] = 0.0f;
+    samples.distant[lane] = 1;
+  }
 }
 
 float PunctualLights::importance(std::size_t light, const Vec3& p, const Vec3& n) const {
@@ -133,21 +131,7 @@ float PunctualLights::importance(std::size_t light, const Vec3& p, const Vec3& n
   return importanceOf(facing, wi, n);
 }
 
-LightTree::Choice PunctualLights::chooseOne(std::size_t first, const Vec3& p, const Vec3& n, float u) const {
-  if (tree_.empty()) return chooseAmong(first, lights_.size(), 0.0f, p, n, u);
-  if (first == directional_) return chooseAmong(first, first, 1.0f, p, n, u);
-  return chooseAmong(first, directional_, tree_.importance({p, n}), p, n, u);
-}
-
-LightSample PunctualLights::choose(std::size_t first, const Vec3& p, const Vec3& n, float u) const {
-  const LightTree::Choice choice = chooseOne(first, p, n, u);
-  if (!(choice.probability > 0.0f)) return {};
-  LightSample sample = sampleOne(choice.light, p);
-  sample.weight /= choice.probability;
-  return sample;
-}
-
-/// What sampling needs of the chosen lights.
+/// Holds what sampling needs of the chosen lights.
 struct alignas(64) PunctualLights::Chosen {
   Vec3Lanes power, position, direction;
   float perRange2[kLanes];
@@ -168,7 +152,7 @@ struct alignas(64) PunctualLights::Chosen {
   }
 };
 
-/// As chooseAmong.
+/// Chooses among at most kLocalLights lights, lane by lane in vector code.
 LUMEL_FOR_EACH_CPU void PunctualLights::chooseAmongFew(std::span<const Source> few, const ReceiverLanes& at,
                                                        const UnitLanes& u, Chosen& chosen) {
   alignas(64) float each[kLocalLights][kLanes];
@@ -235,49 +219,59 @@ void PunctualLights::choose(std::size_t first, const ReceiverLanes& at, const Un
     chooseAmongFew(std::span(lights_).subspan(first), at, u, chosen);
     for (int& light : chosen.light) light += static_cast<int>(first);
   } else {
-    LightTree::Descent descent;
-    const bool byTree = !tree_.empty() && first == directional_;
-    if (byTree) tree_.descend(at.p, &at.ns, at.active, u.u, descent);
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      if (!at.active[lane]) continue;
-      const Vec3 p = at.p[lane], n = at.ns[lane];
-      const LightTree::Choice choice =
-          byTree ? tree_.chooseInLeaf(descent, lane, [&](std::uint32_t light) { return importance(light, p, n); })
-                 : chooseOne(first, p, n, u.u[lane]);
-      chosen.light[lane] = static_cast<int>(choice.light);
-      chosen.probability[lane] = choice.probability;
-    }
+    chooseWithTree(first, at, u, chosen);
   }
   for (std::size_t lane = 0; lane < kLanes; ++lane)
     chosen.set(lane, lights_[static_cast<std::size_t>(chosen.light[lane])]);
   sampleChosen(chosen, at.p, samples);
 }
 
-/// Among lights [first, end) and, if it has any importance, the tree.
-LightTree::Choice PunctualLights::chooseAmong(std::size_t first, std::size_t end, float treeImportance, const Vec3& p,
-                                              const Vec3& n, float u) const {
-  std::array<float, kLocalLights> few;
-  std::vector<float> many;  // more directional lights than that are possible, if unlikely
-  if (end - first > few.size()) many.resize(end - first);
-  float* const importances = many.empty() ? few.data() : many.data();
-  float total = treeImportance;
-  for (std::size_t i = first; i < end; ++i) total += importances[i - first] = importance(i, p, n);
-  if (!(total > 0.0f)) return {};
-  const float threshold = u * total;
-  float before = 0.0f;
-  std::size_t chosen = end;
-  for (std::size_t i = first; i < end; ++i) {
-    if (!(importances[i - first] > 0.0f)) continue;
-    chosen = i;
-    before += importances[i - first];
-    if (threshold < before) break;
+/// Chooses among any number of lights: those that the tree does not hold are asked one by one, and the tree counts as
+/// one more.
+void PunctualLights::chooseWithTree(std::size_t first, const ReceiverLanes& at, const UnitLanes& u,
+                                    Chosen& chosen) const {
+  const std::size_t end = tree_.empty() ? lights_.size() : directional_;
+  LaneFlags toTree = at.active;
+  UnitLanes uTree = u;
+  std::array<float, kLanes> treeShare;
+  treeShare.fill(1.0f);
+  std::vector<float> importances(end - first);
+  for (std::size_t lane = 0; lane < kLanes && first < end; ++lane) {
+    if (!at.active[lane]) continue;
+    const Vec3 p = at.p[lane], n = at.ns[lane];
+    const float treeImportance = tree_.importance({p, n});
+    float total = treeImportance;
+    for (std::size_t i = first; i < end; ++i) total += importances[i - first] = importance(i, p, n);
+    const float threshold = u.u[lane] * total;
+    float before = 0.0f;
+    std::size_t last = end;
+    for (std::size_t i = first; i < end && !(last < end && threshold < before); ++i) {
+      if (!(importances[i - first] > 0.0f)) continue;
+      last = i;
+      before += importances[i - first];
+    }
+    if (last < end && (threshold < before || !(treeImportance > 0.0f))) {
+      toTree[lane] = 0;
+      chosen.light[lane] = static_cast<int>(last);
+      chosen.probability[lane] = importances[last - first] / total;
+    } else if (treeImportance > 0.0f) {
+      uTree.u[lane] = std::clamp((threshold - before) / treeImportance, 0.0f, 0x1.fffffep-1f);
+      treeShare[lane] = treeImportance / total;
+    } else {
+      toTree[lane] = 0;
+    }
   }
-  if (chosen < end && (threshold < before || !(treeImportance > 0.0f)))
-    return {static_cast<std::uint32_t>(chosen), importances[chosen - first] / total};
-  const float rest = std::clamp((threshold - before) / treeImportance, 0.0f, 0x1.fffffep-1f);
-  LightTree::Choice choice = tree_.choose({p, n}, rest, [&](std::uint32_t light) { return importance(light, p, n); });
-  choice.probability *= treeImportance / total;
-  return choice;
+  if (tree_.empty()) return;
+  LightTree::Descent descent;
+  tree_.descend(at.p, &at.ns, toTree, uTree.u, descent);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!toTree[lane]) continue;
+    const Vec3 p = at.p[lane], n = at.ns[lane];
+    const LightTree::Choice choice =
+        tree_.chooseInLeaf(descent, lane, [&](std::uint32_t light) { return importance(light, p, n); });
+    chosen.light[lane] = static_cast<int>(choice.light);
+    chosen.probability[lane] = choice.probability * treeShare[lane];
+  }
 }
 
 }  // namespace lumel

@@ -1,0 +1,83 @@
+// Triangles that shine, as next-event estimation sees them.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "baker/light/light_sample.h"
+#include "baker/light/light_tree.h"
+#include "baker/rays/lanes.h"
+#include "baker/rays/materials.h"
+#include "baker/rays/ray_scene.h"
+#include "baker/rays/sample_lanes.h"
+
+namespace lumel {
+
+/// Samples all triangles of casting instances with an emissive material as one area light.
+class EmissiveTriangles {
+ public:
+  EmissiveTriangles() = default;
+  /// Finds them and sets ScenePart::firstEmitter.
+  EmissiveTriangles(RayScene& rays, const Materials& materials);
+
+  bool empty() const { return tree_.empty(); }
+  std::size_t size() const { return triangles_.size(); }
+
+  /// Density: over triangles by what they can bring to p unshadowed, estimated for groups of them (LightTree) and for
+  /// the few of a group by mean emitted luminance (roughly, over the texture) times solid angle; within a triangle
+  /// uniform by solid angle where that is not small, else by area. Emission from the front alone unless the material
+  /// is doubleSided, times opacity.
+  /// Lanes that are not `active` get a weight of zero.
+  void sample(const Vec3Lanes& p, const LaneFlags& active, const UnitLanes& uTriangle, const UnitSquareLanes& uPoint,
+              LightSampleLanes& samples) const;
+
+  /// Returns the density per solid angle with which sample() from `origin` takes the point that a ray hit. Triangles
+  /// that are never chosen have zero.
+  float pdf(const HitSurface& hit, const Vec3& origin) const;
+
+  /// Triangles that look smaller, in steradians, are sampled by area, which is quicker and nearly the same; and so are
+  /// those that fill nearly a hemisphere, where spherical triangles degenerate.
+  static constexpr float kLeastSolidAngle = 0.03f;
+  static constexpr float kMostSolidAngle = 6.2f;
+
+ private:
+  /// A triangle as sampling reads it. It begins with a row of 16 floats, to be turned into lanes.
+  struct alignas(64) Emitter {
+    Vec3 corner{0};  // world
+    float doubleArea = 0.0f;
+    Vec3 e1{0};              // to the other corners
+    float luminance = 0.0f;  // mean of what it sends out
+    Vec3 e2{0};
+    float back = 0.0f;          // 1: it shines from behind too
+    Vec3 ng{0};                 // unit, front
+    float offsetMeters = 0.0f;  // of the ends of shadow rays
+    Vec3 radiance{0};
+    bool uniform = false;  // it sends out `radiance` everywhere
+    std::uint32_t part = 0;
+    std::uint32_t triangle = 0;
+  };
+  /// Fills all from the part and the triangle.
+  void describe(Emitter& emitter) const;
+  Vec3 radianceAt(const Emitter& emitter, Vec2 barycentric) const;
+  /// Holds the emitters that the lanes chose, and the probability of each choice.
+  struct Chosen;
+  static void chooseAmongFew(std::span<const Emitter> few, const Vec3Lanes& p, const UnitLanes& u, Chosen& chosen);
+  static void chooseInLeaves(const Emitter* triangles, const std::array<LaneFlags, LightTree::kLeaf>& lights,
+                             const LightTree::Descent& descent, const Vec3Lanes& p, Chosen& chosen);
+  static void samplePoints(const Vec3Lanes& p, const UnitSquareLanes& u, Chosen& chosen, LightSampleLanes& samples);
+  /// Returns what the choice within a leaf is in proportion to.
+  float importance(std::uint32_t triangle, const Vec3& p) const;
+
+  const RayScene* rays_ = nullptr;
+  const Materials* materials_ = nullptr;
+  std::vector<Emitter> triangles_;
+  LightTree tree_;
+  std::vector<Emitter> few_;  // all that can be chosen, where one leaf of the tree holds them
+  bool uniform_ = true;       // all are
+};
+
+/// Returns the radiance that leaves a surface found by a ray towards the ray's origin.
+Vec3 emittedTowardsRay(const Materials& materials, const HitSurface& hit);
+
+}  // namespace lumel

@@ -1,0 +1,27 @@
+// What light sampling takes and gives: receivers of a wave, and one light sample for each.
+#pragma once
+
+#include "baker/rays/lanes.h"
+
+namespace lumel {
+
+/// The points of a wave that receive light, a view. Both normals lie on the side that light is gathered on.
+struct ReceiverLanes {
+  const LaneFlags& active;
+  const Vec3Lanes& p;
+  const Vec3Lanes& ng;
+  const Vec3Lanes& ns;
+  const Vec3Lanes& rayStart;
+};
+
+/// One light sample of every lane as seen from its receiver, before visibility.
+struct alignas(64) LightSampleLanes {
+  Vec3Lanes wi;         // unit, towards the light
+  Vec3Lanes weight;     // radiance over the density of this direction; for punctual lights irradiance on a facing
+                        // surface over the probability of choosing the light. Zero: nothing arrives
+  Vec3Lanes target;     // end of the shadow ray, already off the light's own surface; unless distant
+  float pdf[kLanes];    // density per solid angle; 0 for punctual lights, which no ray can hit
+  int distant[kLanes];  // 1: the light is infinitely far away
+};
+
+}  // namespace lumel

@@ -1,0 +1,72 @@
+// Where rays that leave a triangle start: off the surface by a few units in the last place, or on the round surface
+// that the vertex normals describe.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "scene/base/math.h"
+
+namespace lumel {
+
+/// Returns how far in metres rays start off a triangle: a few units in the last place of the largest coordinate that
+/// takes part in finding a point of it (after Waechter and Binder 2019; without their fixed distance near the origin,
+/// so that scenes of any size work). `translation` is the largest coordinate of the instance's translation, for
+/// geometry that Embree places itself; 0 else.
+inline float offsetDistance(const std::array<Vec3, 3>& corners, float translation) {
+  const Vec3 largest = glm::max(glm::max(glm::abs(corners[0]), glm::abs(corners[1])), glm::abs(corners[2]));
+  return 8.0f * std::numeric_limits<float>::epsilon() *
+         (std::max(std::max(largest.x, largest.y), largest.z) + translation);
+}
+
+/// Returns the move that offsetPoint makes; `inwards` is the sum of the vectors to the triangle's corners.
+inline Vec3 rayOffset(const Vec3& ng, const Vec3& inwards, float distance) {
+  const float reach = glm::length(inwards);
+  // At most half the way to the centroid, which lies at inwards / 3.
+  const float share = reach > 6.0f * distance ? distance / reach : 1.0f / 6.0f;
+  return ng * distance + inwards * share;
+}
+
+/// Returns the start of a ray that leaves p, a point of the triangle, on the side of ng. It is moved by offsetDistance
+/// along the normal, so that rounding cannot put it behind the surface, and as far towards the triangle's centroid, so
+/// that it cannot lie beyond a wall that stands on the triangle's edge.
+inline Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const std::array<Vec3, 3>& corners, float translation) {
+  return p +
+         rayOffset(ng, (corners[0] - p) + (corners[1] - p) + (corners[2] - p), offsetDistance(corners, translation));
+}
+
+/// Tells whether unit normals at a triangle's corners describe a surface that is rounded outwards over it: they spread
+/// along its edges. Where they lean by more than 15 degrees (a box with smooth edges, a basin with eight sides) they
+/// are a look and not a shape: rays that start so far out would miss what stands over the facets.
+inline bool isRounded(const Vec3& ng, const Vec3& e1, const Vec3& e2, const std::array<Vec3, 3>& normals) {
+  constexpr float kLeastCosine = 0.966f;
+  for (const Vec3& normal : normals)
+    if (!(glm::dot(ng, normal) > kLeastCosine)) return false;
+  const std::array<float, 3> spread = {glm::dot(normals[1] - normals[0], e1), glm::dot(normals[2] - normals[0], e2),
+                                       glm::dot(normals[2] - normals[1], e2 - e1)};
+  const float most = std::max({spread[0], spread[1], spread[2]});
+  const float least = std::min({spread[0], spread[1], spread[2]});
+  return most > 1e-4f * std::sqrt(std::max(glm::dot(e1, e1), glm::dot(e2, e2))) && least > -0.01f * most;
+}
+
+/// Returns the way from a point of a rounded triangle out to the surface that its unit normals describe, or zero where
+/// that bends inwards.
+/// Rays that start there do not meet the facets of the round thing itself, which would show as steps where its shade
+/// begins (Hanika 2021, "Hacking the Shadow Terminator"). The point lies at `fromFirst` = b.x e1 + b.y e2 from
+/// the first corner.
+inline Vec3 liftToRound(const Vec3& fromFirst, const Vec3& e1, const Vec3& e2, const Vec2& b,
+                        const std::array<Vec3, 3>& normals) {
+  const auto below = [](const Vec3& fromCorner, const Vec3& normal) {
+    const float depth = -glm::dot(fromCorner, normal);
+    return (depth > 0.0f ? depth : 0.0f) * normal;
+  };
+  return (1.0f - b.x - b.y) * below(fromFirst, normals[0]) + b.x * below(fromFirst - e1, normals[1]) +
+         b.y * below(fromFirst - e2, normals[2]);
+}
+
+/// Tells whether rays start at the lifted place (`lift` by liftToRound): where it lies further out than the plain
+/// offset. What is below is then what lies below the shading normal.
+inline bool isLifted(const Vec3& lift, const Vec3& ng, float offsetMeters) { return glm::dot(lift, ng) > offsetMeters; }
+
+}  // namespace lumel
