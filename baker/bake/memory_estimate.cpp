@@ -13,9 +13,9 @@ namespace {
 constexpr double kBase = 145e6;
 
 // Bytes per covered texel and per texel of the pages, and what is resident then.
-// Sampling: places 16, sums 48, reflectance 8, cache 8, counts 22, errors 13, figures of waves 14; the map from pages
-// to texels. The warm-up before it takes less: its links are 40, what they tell of directions 24.
-constexpr double kSamplingPerCovered = 129.0;
+// Sampling: places 16, sums 48, reflectance 8, cache 8, counts 22, errors 13, figures of waves 10; the map from pages
+// to texels. The warm-up before it takes less: its links are 32.
+constexpr double kSamplingPerCovered = 125.0;
 constexpr double kSamplingPerPageTexel = 0.5;
 // Finishing: places; the five images 64, what the denoiser knows of texels and its strips 17, charts and masks.
 constexpr double kFinishingPerCovered = 16.0;

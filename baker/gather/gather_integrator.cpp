@@ -42,8 +42,6 @@ constexpr double kCertain = 8.0;
 /// A texel more of which sees nothing but backs is invalid. Where its chart has no better ones it may be in a room that
 /// is inside out, and all that it found counts.
 constexpr float kMostInside = 0.6f;
-/// Of a texel's kWarmRays: where more meet backs its wave is not guided.
-constexpr int kMostGuidedBacks = 2;
 /// Inside of something whose chart nobody sees texels darker than this share of the mean need no more samples.
 constexpr double kDarkInside = 0.01;
 
@@ -121,7 +119,6 @@ void GatherIntegrator::dropCache() {
   seen_ = std::vector<Vec3>();
   spreads_ = std::vector<LightSpread>();
   substitutes_ = std::vector<TexelMap::Substitute>();
-  guides_ = std::vector<Guide>();
   scene_.reflectance = {};
 }
 
@@ -208,7 +205,7 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
       first[start + i] = warm[i].direct + warm[i].seen;
       constant[start + i] = first[start + i] + warm[i].relit;
       warmBacks_[start + i] = static_cast<std::uint8_t>(warm[i].backs);
-      backFaces_[start + i] = static_cast<float>(std::popcount(warm[i].backs));
+      backFaces_[start + i] = static_cast<std::uint32_t>(std::popcount(warm[i].backs));
       uneven[start + i] = warm[i].isUneven() ? 1 : 0;
       if (!scene_.indirectOnly) continue;
       direct_[start + i] = warm[i].direct;
@@ -221,14 +218,13 @@ Expected<void> GatherIntegrator::warmUp(Progress& progress) {
   substituteInvalid();
   std::vector<PackedColor> reflected = solveLinks(links, std::move(first), constant);
   constant = std::vector<Vec3>();
-  makeGuides(links, reflected);
   map_.setUneven(uneven);
   uneven = std::vector<std::uint8_t>();
   if (scene_.levels.endless) cache_ = std::move(reflected);
   scene_.reflectance = reflectance_;
   for (std::size_t t = 0; t < count; ++t)
     if (!buried_[t]) {
-      backFaces_[t] = 0.0f;
+      backFaces_[t] = 0;
       samplesOf_[t] = 0;
     }
   return {};
@@ -293,45 +289,6 @@ std::vector<PackedColor> GatherIntegrator::solveLinks(const WarmLinks& links, st
   return reflected;
 }
 
-GuideTally GatherIntegrator::tallyOf(std::size_t wave, const WarmLinks& links,
-                                     std::span<const PackedColor> reflected) const {
-  const std::size_t first = (map_.firstOfPage(waves_[wave].page) + waves_[wave].first) * GatherWave::kWarmRays;
-  const std::size_t end = first + std::size_t{waves_[wave].count} * GatherWave::kWarmRays;
-  GuideTally tally;
-  WarmLinks::Reader link(links, wave, first);
-  for (std::size_t i = first; i < end; ++i, link.next()) {
-    const float light = link.isTexel() ? luminance(link.lightOf(reflected)) : link.seen();
-    if (link.bin() < kGuideBins) tally.add(link.bin(), light);
-  }
-  return tally;
-}
-
-void GatherIntegrator::makeGuides(const WarmLinks& links, std::span<const PackedColor> reflected) {
-  // Counts of rays tell what lies inside of things, so where backs are met they go to all sides alike.
-  const auto meetsBacks = [](std::uint8_t warmBacks) { return std::popcount(warmBacks) > kMostGuidedBacks; };
-  std::vector<GuideTally> tallies(waves_.size());
-  parallelFor(waves_.size(), kWaveGrain, [&](std::size_t first, std::size_t last) {
-    for (std::size_t w = first; w < last; ++w) tallies[w] = tallyOf(w, links, reflected);
-  });
-  const auto chartOf = [&](const Wave& wave) {
-    const PageTexels& page = scene_.texels[wave.page];
-    const TriangleRef& ref = page.triangles[page.firstTriangle[wave.first + wave.count / 2]];
-    return scene_.atlas.surfaces[ref.surface].charts[ref.triangle];
-  };
-  const GuideMaker maker(scene_.kernels);
-  guides_.resize(waves_.size());
-  parallelFor(waves_.size(), kWaveGrain, [&](std::size_t first, std::size_t last) {
-    for (std::size_t w = first; w < last; ++w) {
-      const std::size_t start = map_.firstOfPage(waves_[w].page) + waves_[w].first;
-      if (std::ranges::any_of(std::span(warmBacks_).subspan(start, waves_[w].count), meetsBacks)) continue;
-      GuideTally around = tallies[w];  // counts twice
-      for (const std::uint32_t near : errors_->around(w))
-        if (near != DoublingError::kNone && chartOf(waves_[near]) == chartOf(waves_[w])) around.add(tallies[near]);
-      guides_[w] = maker.make(around);
-    }
-  });
-}
-
 Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Progress& progress) {
   auto traced = forEachWave(progress, [&](std::size_t w, GatheredWave& done) {
     const Wave& wave = waves_[w];
@@ -344,7 +301,7 @@ Expected<void> GatherIntegrator::pass(std::uint32_t first, std::uint32_t end, Pr
     const std::span buried = std::span(buried_).subspan(start, wave.count);
     if (first == 0 || std::ranges::count(buried, 0) > 0) {
       GatherWave texels(scene_, wave.page, wave.first, wave.count);
-      texels.gather(first, end, cache_, buried, guides_.empty() ? Guide() : guides_[w], spreadsOf(w), done);
+      texels.gather(first, end, cache_, buried, spreadsOf(w), done);
       for (std::size_t i = 0; i < wave.count; ++i) coverage_[start + i] = texels.coverage(i);
     }
     store(w, done, first, end);
@@ -399,7 +356,7 @@ void GatherIntegrator::store(std::size_t index, const GatheredWave& done, std::u
 
 float GatherIntegrator::weightOf(std::size_t texel) const {
   const auto samples = static_cast<float>(std::max(1u, samplesOf_[texel]));
-  const float inside = inside_[texel].share() * backFaces_[texel];
+  const float inside = inside_[texel].share() * static_cast<float>(backFaces_[texel]);
   return inside > kMostInside * samples ? samples : samples - inside;
 }
 
@@ -407,11 +364,10 @@ void GatherIntegrator::substituteInvalid() {
   std::vector<std::uint8_t> valid(map_.size());
   std::vector<std::uint8_t> wanting(map_.size());
   for (std::size_t t = 0; t < valid.size(); ++t) {
-    const auto samples = static_cast<float>(samplesOf_[t]);
-    valid[t] = 2.0f * backFaces_[t] <= samples ? 1 : 0;
+    valid[t] = 2 * backFaces_[t] <= samplesOf_[t] ? 1 : 0;
     // Of texels wholly inside only rays from inside see anything, and these must not bring the light out there to
     // texels that are partly in the open.
-    wanting[t] = 16.0f * backFaces_[t] < 15.0f * samples ? 1 : 0;
+    wanting[t] = 16.0 * backFaces_[t] < 15.0 * samplesOf_[t] ? 1 : 0;
   }
   substitutes_ = map_.substitutes(wanting, valid);
 }
@@ -420,7 +376,7 @@ void GatherIntegrator::findBuried() {
   std::vector<std::uint8_t> hidden(map_.size());
   std::vector<std::uint8_t> valid(map_.size());
   for (std::size_t t = 0; t < valid.size(); ++t) {
-    const double lead = 2.0 * static_cast<double>(backFaces_[t]) - samplesOf_[t];  // of rays that meet backs
+    const double lead = 2.0 * backFaces_[t] - samplesOf_[t];  // of rays that meet backs
     const bool certain = lead * lead >= kCertain * samplesOf_[t];
     hidden[t] = certain && lead > 0.0 ? 1 : 0;
     valid[t] = certain && lead < 0.0 ? 1 : 0;
@@ -499,7 +455,7 @@ double GatherIntegrator::markDone() {
     std::size_t metHere = 0;
     for (std::size_t i = 0; i < wave.count; ++i) {
       const std::size_t t = start + i;
-      const bool inside = options_.targetError > 0.0f && 2.0f * backFaces_[t] > static_cast<float>(samplesOf_[t]);
+      const bool inside = options_.targetError > 0.0f && 2 * backFaces_[t] > samplesOf_[t];
       metHere +=
           inside || worst * static_cast<double>(errorOf(w, i)) <= goal(static_cast<double>(luminance(meanLight(t))));
     }
@@ -531,7 +487,7 @@ BakedTexel GatherIntegrator::texel(std::uint32_t page, std::size_t index) const 
   BakedTexel baked;
   baked.coverage = coverage_[t];
   const auto taken = static_cast<float>(std::max(1u, samplesOf_[t]));
-  baked.validity = std::max(0.0f, 1.0f - backFaces_[t] / taken);
+  baked.validity = 1.0f - static_cast<float>(backFaces_[t]) / taken;
   baked.standardError = errorOf(firstWave_[page] + index / kLanes, index % kLanes);
   if (coverage_[t] > 0.0f) baked.samples = samplesOf_[t];
   baked.probed = index % kProbeStride == 0;

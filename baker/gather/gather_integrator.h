@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "baker/gather/doubling_error.h"
-#include "baker/gather/gather_guide.h"
 #include "baker/gather/gather_wave.h"
 #include "baker/gather/warm_links.h"
 #include "scene/base/expected.h"
@@ -58,8 +57,7 @@ struct TexelLight {
 ///
 /// 1. A direct map: kWarmLights light samples per texel.
 /// 2. Warm-up: kWarmRays rays per texel are traced once and kept as links to the texels that they hit; the light of
-///    one bounce after another is passed along them, without further rays. Where what they find differs most, a wave
-///    and those around it send the rays of the next step.
+///    one bounce after another is passed along them, without further rays.
 /// 3. Gather: passes of 8, 8, 16, 32, ... samples per texel that continue one sequence. After each the cache is what
 ///    all of them found so far. Hits for which one value for a texel is too coarse (TexelMap) are shaded on the spot;
 ///    whose they are is learnt from the links' rays too.
@@ -113,8 +111,6 @@ class GatherIntegrator {
   /// `light`: irradiance / pi to begin with; `constant`: what every sweep finds again, links apart.
   /// Returns what texels reflect in the end.
   std::vector<PackedColor> solveLinks(const WarmLinks& links, std::vector<Vec3> light, std::span<const Vec3> constant);
-  GuideTally tallyOf(std::size_t wave, const WarmLinks& links, std::span<const PackedColor> reflected) const;
-  void makeGuides(const WarmLinks& links, std::span<const PackedColor> reflected);
   void makeCache();
   void makeSums();
   void dropCache();
@@ -159,10 +155,9 @@ class GatherIntegrator {
   std::vector<Vec3> direct_;
   std::vector<Vec3> seen_;
   std::vector<PackedColor> cache_;  // levels.count per texel
-  std::vector<Guide> guides_;       // of waves; empty: all are even
   std::vector<float> coverage_;
-  std::vector<float> backFaces_;         // rays, each by its stretch
-  std::vector<std::uint8_t> buried_;     // nothing more is gathered for them
+  std::vector<std::uint32_t> backFaces_;  // rays that met backs
+  std::vector<std::uint8_t> buried_;      // nothing more is gathered for them
   std::vector<std::uint8_t> warmBacks_;  // bits of the warm-up's rays, until the first pass is done
   std::vector<InsideTally> inside_;
   std::vector<std::array<Vec3, kProbeNormals>> probes_;

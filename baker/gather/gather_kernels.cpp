@@ -11,7 +11,6 @@ namespace lumel {
 namespace {
 
 constexpr float kLeastComponent = 1e-12f;
-constexpr float kBelowOne = 1.0f - 0x1p-24f;
 
 inline float awayFromZero(float component) {
   const float least = pick(component < 0.0f, -kLeastComponent, kLeastComponent);
@@ -40,66 +39,13 @@ inline float awayFromZero(float component) {
   }
 }
 
-/// `y0` and `dy`: of GuideTable, for each lane.
-template <class Column>
-[[gnu::always_inline]] inline void aimStretched(const GuidedPoints& points, float x0, float dx, const Column& y0,
-                                                const Column& dy, AimedRays& rays) {
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const float x = x0 + dx * points.x[lane];
-    const float y = y0[lane] + dy[lane] * points.y[lane];
-    rays.stretch[lane] = dx * dy[lane];
-    // Rounding must not lead to the horizon, where the density ends.
-    rays.dirTangent.set(lane, sampleGatherHemisphere({x < kBelowOne ? x : kBelowOne, y}));
-  }
-}
-
-/// One value for all lanes.
-struct Same {
-  float value;
-  float operator[](std::size_t) const { return value; }
-};
-struct alignas(64) Each {
-  float value[kLanes];
-  float operator[](std::size_t lane) const { return value[lane]; }
-};
-
 }  // namespace
 
-GuidedPoints guidedPoints(const NetLanes& net, std::uint32_t cell) {
-  const int bitsX = (net.net().log2Count + 1) / 2, bitsY = net.net().log2Count / 2;
-  const NetCell at = netCell(cell);
-  return {.x = net.x(cell),
-          .y = net.y(cell),
-          .row = (at.x * kGuideRows) >> bitsX,
-          .column = (at.y * kGuideColumns) >> bitsY,
-          .columns = std::max(1u, kGuideColumns >> bitsY)};
-}
-
-LUMEL_FOR_EACH_CPU void aimGatherRays(const GuidedPoints& points, const GuideTable& guide, const PointLanes& from,
-                                      AimedRays& rays) {
-  const float x0 = guide.x0[points.row], dx = guide.dx[points.row];
-  const auto& y0 = guide.y0[points.row];
-  const auto& dy = guide.dy[points.row];
-  const std::uint32_t first = points.column;
-  if (points.columns == 1) {
-    aimStretched(points, x0, dx, Same{y0[first]}, Same{dy[first]}, rays);
-  } else {
-    Each start, scale;
-    std::fill_n(start.value, kLanes, y0[first]);
-    std::fill_n(scale.value, kLanes, dy[first]);
-    for (std::uint32_t column = first + 1; column < first + points.columns; ++column) {
-      const float border = static_cast<float>(column) / static_cast<float>(kGuideColumns);
-      const float startHere = y0[column], scaleHere = dy[column];
-      for (std::size_t lane = 0; lane < kLanes; ++lane) {
-        const bool reaches = points.y[lane] >= border;
-        start.value[lane] = pick(reaches, startHere, start.value[lane]);
-        scale.value[lane] = pick(reaches, scaleHere, scale.value[lane]);
-      }
-    }
-    aimStretched(points, x0, dx, start, scale, rays);
-  }
+LUMEL_FOR_EACH_CPU void aimGatherRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    rays.dirTangent.set(lane, sampleGatherHemisphere({x[lane], y[lane]}));
   aim(from, rays);
-  for (std::size_t lane = 0; lane < kLanes; ++lane) rays.weight[lane] = kInvPi * rays.stretch[lane] / rays.pdf[lane];
+  for (std::size_t lane = 0; lane < kLanes; ++lane) rays.weight[lane] = kInvPi / rays.pdf[lane];
 }
 
 LUMEL_FOR_EACH_CPU void aimCosineRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays) {

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 
-#include "baker/gather/gather_guide.h"
 #include "baker/gather/packed_color.h"
 #include "baker/gather/wave_points.h"
 #include "baker/rays/lanes.h"
@@ -15,30 +14,17 @@ namespace lumel {
 /// The gather rays of a wave: each lane's goes out from its own point.
 struct AimedRays {
   Vec3Lanes dirTangent;
-  alignas(64) float pdf[kLanes] = {};      // the gather's density per solid angle, by which it is weighed with lights
-  alignas(64) float stretch[kLanes] = {};  // pdf over the density with which the ray was aimed
-  alignas(64) float weight[kLanes] = {};   // of the light that it finds: stretch / (pi pdf)
+  alignas(64) float pdf[kLanes] = {};     // per solid angle; light samples are weighed against it
+  alignas(64) float weight[kLanes] = {};  // of the light that the ray finds: 1 / (pi pdf)
   RayPacket packet;
 };
 
-/// The points of a net's cell, which lie in one row of a guide; from 2^kLeastGuided points on nets are so fine.
-struct GuidedPoints {
-  const float* x;  // kLanes values each
-  const float* y;
-  std::uint32_t row = 0;
-  std::uint32_t column = 0;   // the first that they lie in
-  std::uint32_t columns = 1;  // and how many there are
-};
-inline constexpr int kLeastGuided = 3;
-static_assert(kGuideRows == 4);
-GuidedPoints guidedPoints(const NetLanes& net, std::uint32_t cell);
-
-/// Aims by sampleGatherHemisphere where the guide leads the points. Lanes whose ray would go below the geometric
+/// Aims by sampleGatherHemisphere at u = (x, y), kLanes values each. Lanes whose ray would go below the geometric
 /// surface, and those without a texel, are not valid: a bent shading normal gathers from there too, where nothing
 /// arrives. No component of a ray's direction is nearer to zero than 1e-12 (see TraceMode::Coherent).
-void aimGatherRays(const GuidedPoints& points, const GuideTable& guide, const PointLanes& from, AimedRays& rays);
+void aimGatherRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays);
 
-/// The same by the cosine at u = (x, y), unguided; `pdf` is still the gather's, and there are no weights.
+/// Aims the same rays by the cosine; `pdf` is still the gather's, and there are no weights.
 void aimCosineRays(const float* x, const float* y, const PointLanes& from, AimedRays& rays);
 
 /// How many rays of a traced packet found something else than the lane before theirs; 0 to kLanes - 1.

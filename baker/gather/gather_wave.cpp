@@ -19,7 +19,6 @@ constexpr std::uint32_t kLightStretch = kLightPatterns + 5;
 struct WarmSink {
   std::array<WarmTexel, kLanes>& texels;
   std::span<CacheLink> links;
-  bool indirectOnly;
 
   CacheLink& linkOf(const Flight& flight) { return links[flight.lane * GatherWave::kWarmRays + flight.sample]; }
   void light(const Flight& flight, const Vec3& radiance, int depth) {
@@ -27,7 +26,6 @@ struct WarmSink {
     const Vec3 light = flight.beta * radiance;
     if (!isFinite(light)) return;
     (depth == 0 ? texel.seen : texel.relit) += light;
-    if (depth > 0 || !indirectOnly) linkOf(flight).light += luminance(light);
   }
   void texel(const Flight& flight, std::uint32_t texel) {
     linkOf(flight).texel = texel;
@@ -52,7 +50,6 @@ struct GatherSink {
   bool tallied = false;  // whether the gather rays are
   LightTally rays{};
   std::size_t point = 0;  // the footprint point that the ray at hand comes from
-  float stretch = 1.0f;   // and its AimedRays::stretch
   std::array<std::array<std::uint8_t, WavePoints::kMost>, kLanes> backs{};  // rays of a net that met backs, by point
 
   /// Radiance that a texel reflects, by level.
@@ -133,7 +130,7 @@ struct GatherSink {
     passOnLevels(flight.lane, flight.dirTangent, flight.beta, texel, flight.depth);
   }
   void backFace(const Flight& flight) {
-    result.texels[flight.lane].backFaces += stretch;
+    ++result.texels[flight.lane].backFaces;
     ++backs[flight.lane][point];
   }
 
@@ -288,7 +285,7 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
   }
   warmDirect(texels, counts);
 
-  WarmSink sink{texels, links, scene_.indirectOnly};
+  WarmSink sink{texels, links};
   GatherTracer tracer(scene_.transport, scene_.map, scene_.reflectance, scene_.lastDepth, sink);
   SampleLanes samples = lightSamples_;
   AimedRays& rays = packets_[0].rays;
@@ -300,8 +297,6 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
     aimCosineRays(u.x, u.y, from, rays);
     scene_.transport.rays.intersect(rays.packet, TraceMode::Packet);
     for (std::size_t lane = count_; lane < kLanes; ++lane) rays.packet.valid[lane] = 0;
-    for (std::size_t lane = 0; lane < count_; ++lane)
-      if (covered_[lane]) links[lane * kWarmRays + s].bin = guideBin(rays.dirTangent.z[lane], u.y[lane]);
     TexelMap::Lookup& lookup = packets_[0].lookup;
     scene_.map.findAll(rays.packet, lookup);
     forEachLane(lookup.near, [&](std::size_t lane) { texels[lane].nears |= 1u << s; });
@@ -327,7 +322,7 @@ std::array<WarmTexel, kLanes> GatherWave::warmUp(std::span<CacheLink> links, Gat
 }
 
 void GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
-                        std::span<const std::uint8_t> buried, const Guide& guide, std::span<LightSpread> spreads,
+                        std::span<const std::uint8_t> buried, std::span<LightSpread> spreads,
                         GatheredWave& result) {
   GatherSink sink{scene_, cache, result, page_, std::span(scene_.texels[page_].coords).subspan(first_, count_)};
   for (std::size_t lane = 0; lane < count_; ++lane)
@@ -343,7 +338,7 @@ void GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const 
     if (!spreads.empty()) gatherLight(net, spreads, sink);
     points_.draw(samplers_, kFootprint, net.first, std::min(WavePoints::kMost, net.count()));
     sink.tallied = !spreads.empty() && isPilot(net.first);
-    gatherRays(net, guide, tracer, sink);
+    gatherRays(net, tracer, sink);
     if (sink.tallied) {
       tracer.finish();
       sink.rays.enter(spreads.back(), net.count(), coveredCount_);
@@ -431,9 +426,7 @@ void GatherWave::sampleStrategy(std::size_t strategy, std::uint32_t first, std::
   settle(sink.sums, sink.totals);
 }
 
-void GatherWave::gatherRays(const NetRange& net, const Guide& guide, GatherTracer<GatherSink>& tracer,
-                            GatherSink& sink) {
-  const GuideTable table(net.log2Count >= kLeastGuided ? guide : Guide());
+void GatherWave::gatherRays(const NetRange& net, GatherTracer<GatherSink>& tracer, GatherSink& sink) {
   net_.fill(samplers_, covered_, net, kDirection);
   const std::uint32_t count = net.count();
   // While one packet is traced, memory is asked for what those before it hit. What is there already is read first: it
@@ -443,7 +436,7 @@ void GatherWave::gatherRays(const NetRange& net, const Guide& guide, GatherTrace
     const auto inFlight = [&](std::uint32_t age) { return step >= age && step - age < count; };
     if (inFlight(0)) {
       packet(0).cell = step;
-      launch(table, packet(0));
+      launch(packet(0));
     }
     if (inFlight(3)) {
       collect(packet(3), tracer, sink);
@@ -466,8 +459,8 @@ void GatherWave::gatherRays(const NetRange& net, const Guide& guide, GatherTrace
 static std::uint32_t pointOf(std::uint32_t cell) { return cell ^ ((cell >> 1) & 8u); }
 
 /// Sends the rays of all lanes into one cell of the net.
-void GatherWave::launch(const GuideTable& guide, Packet& packet) {
-  aimGatherRays(guidedPoints(net_, packet.cell), guide, points_[pointOf(packet.cell)], packet.rays);
+void GatherWave::launch(Packet& packet) {
+  aimGatherRays(net_.x(packet.cell), net_.y(packet.cell), points_[pointOf(packet.cell)], packet.rays);
   scene_.transport.rays.intersect(packet.rays.packet, scene_.gatherMode.value_or(pilot_.mode()));
   pilot_.see(packet.rays.packet);
 }
@@ -501,7 +494,6 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
   forEachLane(found.others, [&](std::size_t lane) {
     const Flight flight = flightOf(lane, net_.sample(packet.cell, lane), points_[pointOf(packet.cell)], rays);
     sink.point = pointOf(packet.cell) % WavePoints::kMost;
-    sink.stretch = rays.stretch[lane];
     tracer.arrive(rays.packet, static_cast<int>(lane), flight, lookup);
   });
   if (found.missed != 0 && scene_.transport.environment.shines()) collectSky(rays, found.missed, light, sink);

@@ -79,7 +79,7 @@ struct GatheredTexel {
   std::array<Vec3d, CacheLevels::kMost> levels{};  // flat light of the cache's levels, unless endless
   std::array<Vec3d, kProbeNormals> probes{};       // where the texel is probed
   Vec3d seen{0};  // with GatherScene::indirectOnly: flat light from what rays see shine by itself, not in the maps
-  float backFaces = 0.0f;        // rays that met backs, each by its AimedRays::stretch
+  std::uint32_t backFaces = 0;   // rays that met backs
   std::uint32_t firstBacks = 0;  // bits of the first kWarmRays samples, each from a point of its own
   InsideTally inside;            // of nets with two rays and more from each point
 };
@@ -94,9 +94,7 @@ struct GatheredWave {
 /// A link of the warm-up: one ray, and the texel that it found.
 struct CacheLink {
   std::uint32_t texel = kNoTexel;
-  std::uint32_t weight = 0;        // packWeight: red, green, blue in steps of 1/1023
-  float light = 0.0f;              // luminance that the maps would get by what the ray saw, texels apart
-  std::uint32_t bin = kGuideBins;  // guideBin of its direction; kGuideBins: there was no ray
+  std::uint32_t weight = 0;  // packWeight: red, green, blue in steps of 1/1023
 };
 std::uint32_t packWeight(const Vec3& weight);  // 0..1, clamped
 Vec3 unpackWeight(std::uint32_t packed);
@@ -132,12 +130,11 @@ class GatherWave {
   std::array<WarmTexel, kLanes> warmUp(std::span<CacheLink> links, GatheredWave& counts);
 
   /// Samples [first, end) of every covered texel. `cache`: levels.count values per texel of the map, the radiance
-  /// that the texel reflects. `buried`: one per texel of the wave; nothing is gathered for those. `guide`: leads the
-  /// gather rays, the same in all passes. `spreads`: what the wave remembers of its light from pass to pass: of each of
-  /// GatherScene::strategies, and last of the gather rays; empty without strategies. `result`: empty before.
+  /// that the texel reflects. `buried`: one per texel of the wave; nothing is gathered for those. `spreads`: what
+  /// the wave remembers of its light from pass to pass: of each of GatherScene::strategies, and last of the gather rays;
+  /// empty without strategies. `result`: empty before.
   void gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
-              std::span<const std::uint8_t> buried, const Guide& guide, std::span<LightSpread> spreads,
-              GatheredWave& result);
+              std::span<const std::uint8_t> buried, std::span<LightSpread> spreads, GatheredWave& result);
 
  private:
   /// What a texel's reflectance is the mean of.
@@ -154,14 +151,14 @@ class GatherWave {
   void gatherLight(const NetRange& net, std::span<LightSpread> spreads, GatherSink& sink);
   void sampleStrategy(std::size_t strategy, std::uint32_t first, std::uint32_t end, float weight, bool pilot,
                       GatherSink& sink);
-  void gatherRays(const NetRange& net, const Guide& guide, GatherTracer<GatherSink>& tracer, GatherSink& sink);
+  void gatherRays(const NetRange& net, GatherTracer<GatherSink>& tracer, GatherSink& sink);
   /// A packet of gather rays, from its start to where the light of its texels is known.
   struct Packet {
     std::uint32_t cell = 0;  // of the net
     AimedRays rays;
     TexelMap::Lookup lookup;
   };
-  void launch(const GuideTable& guide, Packet& packet);
+  void launch(Packet& packet);
   static void expectSpots(const Packet& packet, const GatherTracer<GatherSink>& tracer);
   static void expectLight(const Packet& packet, const GatherTracer<GatherSink>& tracer, const GatherSink& sink);
   void collect(const Packet& packet, GatherTracer<GatherSink>& tracer, GatherSink& sink) const;

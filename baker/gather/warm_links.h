@@ -2,7 +2,6 @@
 // again and again without tracing.
 #pragma once
 
-#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -11,7 +10,7 @@
 
 namespace lumel {
 
-/// GatherWave::kWarmRays links for each texel, numbered through: 5 bytes each, and 8 more for those that pass on only a
+/// GatherWave::kWarmRays links for each texel, numbered through: 4 bytes each, and 8 more for those that pass on only a
 /// share.
 class WarmLinks {
  public:
@@ -27,11 +26,9 @@ class WarmLinks {
     std::uint32_t link = 0;  // of the wave: texel * kWarmRays + ray
     std::uint32_t weight = 0;
   };
-  static constexpr std::uint32_t kLight = 0x80000000u;
   static constexpr std::uint32_t kAhead = 32;
 
-  std::vector<std::uint32_t> found_;  // the texel (below kLight), or else the luminance seen, negated
-  std::vector<std::uint8_t> bins_;
+  std::vector<std::uint32_t> found_;        // the texel; kNoTexel: none
   std::vector<std::vector<Share>> shares_;  // per wave, in order
 };
 
@@ -40,27 +37,21 @@ class WarmLinks::Reader {
  public:
   Reader(const WarmLinks& links, std::size_t wave, std::size_t first)
       : found_(links.found_.data() + first),
-        bins_(links.bins_.data() + first),
         share_(links.shares_[wave].begin()),
         end_(links.shares_[wave].end()) {}
 
-  bool isTexel() const { return found_[at_] < kLight; }
+  bool isTexel() const { return found_[at_] != kNoTexel; }
   /// What the texel of the link passes on; once for each link. Asks memory for what a later link will.
   Vec3 lightOf(std::span<const PackedColor> reflected) {
     const std::uint32_t later = found_[at_ + kAhead];
-    __builtin_prefetch(reflected.data() + (later < kLight ? later : 0u));
+    __builtin_prefetch(reflected.data() + (later != kNoTexel ? later : 0u));
     const Vec3 light = unpackColor(reflected[found_[at_]]);
     return share_ != end_ && share_->link == at_ ? light * unpackWeight(share_++->weight) : light;
   }
-  /// Luminance, where the link has no texel.
-  float seen() const { return -std::bit_cast<float>(found_[at_]); }
-  /// CacheLink::bin.
-  std::uint32_t bin() const { return bins_[at_]; }
   void next() { ++at_; }
 
  private:
   const std::uint32_t* found_;
-  const std::uint8_t* bins_;
   std::vector<Share>::const_iterator share_, end_;
   std::uint32_t at_ = 0;
 };

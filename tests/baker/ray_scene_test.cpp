@@ -344,7 +344,7 @@ AimedRays aimed(const Vec3& from, float width, std::uint32_t seed) {
     frame.set(lane, {{1, 0, 0}, {0, 0, -1}, {0, 1, 0}});
   }
   AimedRays rays;
-  aimGatherRays({.x = x, .y = y}, GuideTable(Guide()), {active, p, p, frame, ng}, rays);
+  aimGatherRays(x, y, {active, p, p, frame, ng}, rays);
   return rays;
 }
 
