@@ -7,10 +7,14 @@
 #include <optional>
 #include <span>
 
+#include "baker/bake/gather_session.h"
 #include "baker/gather/doubling_error.h"
 #include "baker/gather/gather_integrator.h"
+#include "baker/gather/waves.h"
+#include "baker/light/lit_scene.h"
 #include "baker/path/path_integrator.h"
 #include "baker/rays/flush_denormals.h"
+#include "scene/base/check.h"
 #include "scene/base/parallel.h"
 #include "scene/base/stopwatch.h"
 
@@ -19,23 +23,8 @@ namespace {
 
 constexpr std::size_t kMostNotes = 10;
 
-/// Samples where nothing shines: only validity is left to find out.
+/// Samples per texel where nothing shines: only validity is left to find out.
 constexpr int kSamplesInTheDark = 8;
-
-/// Up to kLanes consecutive texels of a page.
-struct Wave {
-  std::uint32_t page = 0;
-  std::size_t first = 0;
-  std::size_t count = 0;
-};
-
-std::vector<Wave> wavesOf(const std::vector<PageTexels>& texels) {
-  std::vector<Wave> waves;
-  for (std::size_t p = 0; p < texels.size(); ++p)
-    for (std::size_t first = 0; first < texels[p].size(); first += kLanes)
-      waves.push_back({static_cast<std::uint32_t>(p), first, std::min<std::size_t>(kLanes, texels[p].size() - first)});
-  return waves;
-}
 
 /// What a wave leaves beside its texels' pixels; summed in the order of waves.
 struct WaveStats {
@@ -138,10 +127,11 @@ Image pageImage(const Atlas& atlas, std::size_t page, int channels) {
 constexpr std::size_t kTexelGrain = 1024;
 
 /// Finishes the light of a page's texels [first, last) and stores all but the maps.
-void finishTexels(const GatherIntegrator& integrator, std::uint32_t page, const PageTexels& texels, std::size_t first,
-                  std::size_t last, Projection projection, TexelLight& light, Image& aux, WaveStats& stats) {
+void finishTexels(const GatherIntegrator& integrator, const GatherState& state, std::uint32_t page,
+                  const PageTexels& texels, std::size_t first, std::size_t last, Projection projection,
+                  TexelLight& light, Image& aux, WaveStats& stats) {
   for (std::size_t i = first; i < last; ++i) {
-    const BakedTexel texel = integrator.texel(page, i);
+    const BakedTexel texel = integrator.texel(state, page, i);
     if (!(texel.coverage > 0.0f)) continue;
     const std::size_t t = integrator.firstOfPage(page) + i;
     std::array<Vec3, 3> rnm = {light.rnm[0][t], light.rnm[1][t], light.rnm[2][t]};
@@ -167,36 +157,52 @@ std::vector<Image> takeMap(std::vector<Vec3>& map, const Atlas& atlas, const std
   return images;
 }
 
+GatherOptions gatherOptionsOf(const BakeOptions& options) {
+  return {.samples = std::max(1, options.samples),
+          .maxSamples = options.maxSamples,
+          .bounces = options.bounces,
+          .indirectOnly = options.indirectOnly,
+          .seed = options.seed,
+          .targetError = options.targetError,
+          .adaptive = options.adaptive,
+          .timeBudgetSeconds = static_cast<double>(options.timeBudgetSeconds)};
+}
+
+WaveStats countsOf(const GatherState& state) {
+  WaveStats stats;
+  stats.rays = state.rays;
+  stats.shadowRays = state.shadowRays;
+  stats.nonFinite = state.nonFinite.size();
+  const auto named = static_cast<std::ptrdiff_t>(std::min(kMostNotes, stats.nonFinite));
+  for (auto it = state.nonFinite.begin(); it < state.nonFinite.begin() + named; ++it)
+    stats.firstNonFinite.push_back(it->sample);
+  return stats;
+}
+
 Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
                                         const std::vector<PageTexels>& texels, const BakeOptions& options,
-                                        std::vector<BakedPage>& pages, Progress& progress) {
-  const GatherOptions gatherOptions{.samples = std::max(1, options.samples),
-                                    .maxSamples = options.maxSamples,
-                                    .bounces = options.bounces,
-                                    .indirectOnly = options.indirectOnly,
-                                    .seed = options.seed,
-                                    .targetError = options.targetError,
-                                    .adaptive = options.adaptive,
-                                    .timeBudgetSeconds = static_cast<double>(options.timeBudgetSeconds)};
-  std::optional<GatherIntegrator> integrator(std::in_place, transport, kernels, atlas, texels, gatherOptions);
-  if (auto done = integrator->run(progress); !done) return done.error();
+                                        GatherSession& session, std::vector<BakedPage>& pages, Progress& progress) {
+  std::optional<GatherIntegrator> integrator(std::in_place, transport, kernels, atlas, texels,
+                                             gatherOptionsOf(options));
+  if (!session.state) session.state = integrator->begin();
+  GatherState& state = *session.state;
+  if (auto done = integrator->run(state, progress, session.pauses); !done) return done.error();
+  if (session.keepsSurfaces) session.surfaces.emplace(integrator->takeSurfaces(state));
+  state.dropCache();
   // Texels become pages map by map: the two together would be the peak of a bake's memory.
-  TexelLight light = integrator->takeLight();
+  TexelLight light = integrator->takeLight(state);
   pages.resize(atlas.pages.size());
-  std::vector<WaveStats> stats(1);
-  stats[0].rays = integrator->rays();
-  stats[0].shadowRays = integrator->shadowRays();
-  stats[0].nonFinite = integrator->nonFinite().size();
-  stats[0].firstNonFinite = integrator->nonFinite();
+  std::vector<WaveStats> stats(1, countsOf(state));
   for (std::size_t p = 0; p < pages.size(); ++p) {
     pages[p].aux = pageImage(atlas, p, 4);
     const std::size_t before = stats.size();
     stats.resize(before + (texels[p].size() + kTexelGrain - 1) / kTexelGrain);
     parallelFor(texels[p].size(), kTexelGrain, [&](std::size_t first, std::size_t last) {
-      finishTexels(*integrator, static_cast<std::uint32_t>(p), texels[p], first, last, options.projection, light,
+      finishTexels(*integrator, state, static_cast<std::uint32_t>(p), texels[p], first, last, options.projection, light,
                    pages[p].aux, stats[before + first / kTexelGrain]);
     });
   }
+  session.state.reset();
   integrator.reset();
   const auto take = [&](std::vector<Vec3>& map, auto imageOf) {
     std::vector<Image> images = takeMap(map, atlas, texels);
@@ -214,10 +220,10 @@ constexpr std::array<int, 5> kMarks = {1, 2, 4, 8, TexelSums::kBatches};
 using WaveMeans = std::array<std::array<float, kLanes>, kMarks.size()>;
 
 /// The standard errors of path-traced texels, as if their samples had been taken by doubling.
-void storePathErrors(const std::vector<Wave>& waves, const std::vector<WaveMeans>& means, int samples,
+void storePathErrors(const Waves& waves, const std::vector<WaveMeans>& means, int samples,
                      const std::vector<PageTexels>& texels, std::vector<BakedPage>& pages,
                      std::vector<WaveStats>& stats) {
-  DoublingError errors(texels, kPathCredit);
+  DoublingError errors(waves, kPathCredit);
   const std::vector<std::uint8_t> live(waves.size(), 1);
   for (std::size_t m = 0; m < kMarks.size(); ++m) {
     const auto samplesAt = [samples](int mark) {
@@ -227,15 +233,15 @@ void storePathErrors(const std::vector<Wave>& waves, const std::vector<WaveMeans
     const std::uint32_t now = samplesAt(kMarks[m]);
     if (now == before) continue;
     for (std::size_t w = 0; w < waves.size(); ++w)
-      errors.add(w, means[w][m == 0 ? 0 : m - 1], means[w][m], before, now - before);
-    errors.endPass(live);
+      errors.add(waves, w, means[w][m == 0 ? 0 : m - 1], means[w][m], before, now - before);
+    errors.endPass(waves, live);
   }
   for (std::size_t w = 0; w < waves.size(); ++w)
     for (std::size_t i = 0; i < waves[w].count; ++i) {
       const TexelCoord at = texels[waves[w].page].coords[waves[w].first + i];
       float* aux = pages[waves[w].page].aux.at(at.x, at.y);
       if (!(aux[0] > 0.0f)) continue;
-      aux[2] = errors.standardError(w, i);
+      aux[2] = errors.standardError(waves, w, i);
       if (aux[1] >= 0.5f) stats[w].standardError += static_cast<double>(aux[2]);
     }
 }
@@ -255,12 +261,10 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
       *image = pageImage(atlas, p, 3);
     pages[p].aux = pageImage(atlas, p, 4);
   }
-  const std::vector<Wave> waves = wavesOf(texels);
+  const Waves waves(texels);
   std::vector<WaveStats> waveStats(waves.size());
-  std::uint64_t texelCount = 0;
-  for (const PageTexels& page : texels) texelCount += page.size();
   std::vector<WaveMeans> means(waves.size());
-  progress.begin("bake", texelCount);
+  progress.begin("bake", waves.texels());
   parallelFor(waves.size(), 1, [&](std::size_t first, std::size_t last) {
     const FlushDenormals flush;
     for (std::size_t w = first; w < last; ++w) {
@@ -287,38 +291,54 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
   return waveStats;
 }
 
+/// Options as they can be followed: where nothing shines only validity is left to find out.
+BakeOptions optionsFor(const LightTransport& transport, BakeOptions options) {
+  if (!transport.dark()) return options;
+  options.samples = std::min(options.samples, kSamplesInTheDark);
+  options.bounces = 0;
+  options.targetError = 0.0f;
+  return options;
+}
+
 }  // namespace
 
 Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
-                          const BakeOptions& askedFor, Progress& progress) {
+                          const BakeOptions& options, Progress& progress) {
   const Stopwatch sinceStart;
-  std::vector<std::string> notes;
-  const Materials materials(scene, askedFor.bounces != 0, notes);
-  auto rays = RayScene::build(scene, materials);
-  if (!rays) return rays.error();
-  const PunctualLights punctual(scene.lights);
-  const EmissiveTriangles emissive(**rays, materials);
-  const EnvironmentLight environment(scene.environment);
-  const LightTransport transport{**rays, materials, punctual, emissive, environment};
-  const RnmKernels kernels(askedFor.projection);
-  BakeOptions options = askedFor;
-  if (transport.dark()) {
-    options.samples = std::min(options.samples, kSamplesInTheDark);
-    options.bounces = 0;
-    options.targetError = 0.0f;
-  }
+  const auto lit = LitScene::build(scene, options.bounces != 0);
+  if (!lit) return lit.error();
+  auto result = bake(**lit, atlas, texels, options, progress);
+  if (result) result->stats.seconds = sinceStart.seconds();
+  return result;
+}
 
+Expected<BakeResult> bake(const LitScene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                          const BakeOptions& askedFor, Progress& progress, GatherSession* session) {
+  LUMEL_CHECK(scene.hasAlbedo() || askedFor.bounces == 0);
+  const Stopwatch sinceStart;
+  const LightTransport& transport = scene.transport();
+  const RnmKernels kernels(askedFor.projection);
+  const BakeOptions options = optionsFor(transport, askedFor);
   BakeResult result;
+  GatherSession alone;
   const auto waveStats = options.integrator == Integrator::Gather
-                             ? gather(transport, kernels, atlas, texels, options, result.pages, progress)
+                             ? gather(transport, kernels, atlas, texels, options, session != nullptr ? *session : alone,
+                                      result.pages, progress)
                              : tracePaths(transport, kernels, atlas, texels, options, result.pages, progress);
   if (!waveStats) return waveStats.error();
 
   result.stats = sumUp(*waveStats, options);
   for (const PageTexels& page : texels) result.stats.texels += page.size();
-  result.stats.notes.insert(result.stats.notes.begin(), notes.begin(), notes.end());
+  result.stats.notes.insert(result.stats.notes.begin(), scene.notes().begin(), scene.notes().end());
   result.stats.seconds = sinceStart.seconds();
   return result;
+}
+
+std::uint64_t sessionKey(const LitScene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                         const BakeOptions& askedFor) {
+  const RnmKernels kernels(askedFor.projection);
+  const BakeOptions options = optionsFor(scene.transport(), askedFor);
+  return GatherIntegrator(scene.transport(), kernels, atlas, texels, gatherOptionsOf(options)).key();
 }
 
 }  // namespace lumel

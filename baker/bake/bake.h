@@ -46,9 +46,22 @@ struct BakeResult {
   BakeStats stats;
 };
 
+class LitScene;
+struct GatherSession;
+
 /// Finds the light at every covered texel. The result depends on scene, atlas and options alone, bit for bit, never on
 /// the number of threads. Errors: Failed (Embree, memory), Interrupted.
 Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
                           const BakeOptions& options, Progress& progress);
+
+/// The same for a scene that is used more than once. Precondition: it has albedo, or no bounces are asked for.
+/// `session`: with Integrator::Gather, lets the bake be stopped and gone on with; null: neither. Errors: Interrupted;
+/// Input, where the session's state is of another bake.
+Expected<BakeResult> bake(const LitScene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                          const BakeOptions& options, Progress& progress, GatherSession* session = nullptr);
+
+/// Tells the states of one bake from those of others (readState): a hash of options, texels and surfaces.
+std::uint64_t sessionKey(const LitScene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                         const BakeOptions& options);
 
 }  // namespace lumel

@@ -3,7 +3,7 @@
 #include <cstring>
 #include <limits>
 
-#include "baker/gather/texel_cache.h"
+#include "baker/gather/texel_map.h"
 #include "baker/rays/sampling.h"
 #include "lightmap/maps/rnm_basis.h"
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "baker/gather/packed_color.h"
-#include "baker/gather/texel_cache.h"
+#include "baker/gather/texel_map.h"
 #include "baker/light/direct_light.h"
 #include "baker/light/light_transport.h"
 #include "baker/rays/sampling.h"

@@ -3,7 +3,7 @@
 namespace lumel {
 
 WarmLinks::WarmLinks(std::size_t texels, std::size_t waves)
-    : found_(texels * GatherWave::kWarmRays + kAhead, kNoTexel), shares_(waves) {}
+    : found_(texels * kWarmRays + kAhead, kNoTexel), shares_(waves) {}
 
 void WarmLinks::keep(std::size_t wave, std::size_t first, std::span<const CacheLink> found) {
   static const std::uint32_t whole = packWeight(Vec3(1.0f));

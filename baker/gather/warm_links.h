@@ -6,11 +6,11 @@
 #include <span>
 #include <vector>
 
-#include "baker/gather/gather_wave.h"
+#include "baker/gather/warm_wave.h"
 
 namespace lumel {
 
-/// GatherWave::kWarmRays links for each texel, numbered through: 4 bytes each, and 8 more for those that pass on only a
+/// kWarmRays links for each texel, numbered through: 4 bytes each, and 8 more for those that pass on only a
 /// share.
 class WarmLinks {
  public:
@@ -36,9 +36,7 @@ class WarmLinks {
 class WarmLinks::Reader {
  public:
   Reader(const WarmLinks& links, std::size_t wave, std::size_t first)
-      : found_(links.found_.data() + first),
-        share_(links.shares_[wave].begin()),
-        end_(links.shares_[wave].end()) {}
+      : found_(links.found_.data() + first), share_(links.shares_[wave].begin()), end_(links.shares_[wave].end()) {}
 
   bool isTexel() const { return found_[at_] != kNoTexel; }
   /// What the texel of the link passes on; once for each link. Asks memory for what a later link will.

@@ -4,7 +4,7 @@
 
 #include <cstdio>
 
-#include "baker/gather/doubling_error.h"
+#include "baker/gather/waves.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {
@@ -145,13 +145,13 @@ TEST(ErrorCoverage, TargetErrorIsMetAndUnbiased) {
 }
 
 // In every direction: a pool along rows of tiles alone showed as streaks in the sample counts.
-TEST(DoublingErrorRuns, ThoseAroundLieAroundOnThePage) {
+TEST(Waves, ThoseAroundLieAroundOnThePage) {
   TestScene test;
-  test.addRectangle({0, 0, 1}, {1, 0, 0}, {0, 0, -1}, {.texels = 16});  // 4 x 4 tiles, a run each
-  const DoublingError errors(findTexels(test.atlas), 0.5);
-  constexpr std::uint32_t none = DoublingError::kNone;
-  EXPECT_EQ(errors.around(5), (std::array<std::uint32_t, 9>{0, 1, 2, 4, 5, 6, 8, 9, 10}));
-  EXPECT_EQ(errors.around(0), (std::array<std::uint32_t, 9>{none, none, none, none, 0, 1, none, 4, 5}));
+  test.addRectangle({0, 0, 1}, {1, 0, 0}, {0, 0, -1}, {.texels = 16});  // 4 x 4 tiles, a wave each
+  const Waves waves(findTexels(test.atlas));
+  constexpr std::uint32_t none = Waves::kNone;
+  EXPECT_EQ(waves.around(5), (std::array<std::uint32_t, 9>{0, 1, 2, 4, 5, 6, 8, 9, 10}));
+  EXPECT_EQ(waves.around(0), (std::array<std::uint32_t, 9>{none, none, none, none, 0, 1, none, 4, 5}));
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include <optional>
 
 #include "baker/gather/gather_wave.h"
+#include "baker/gather/warm_wave.h"
 #include "tests/bench/gather_scenes.h"
 
 namespace lumel {
@@ -23,9 +24,6 @@ namespace {
 
 using namespace bench_scenes;
 
-// As GatherWave numbers them: the naive loop takes the same samples.
-constexpr std::uint32_t kFootprint = kLightPatterns;
-constexpr std::uint32_t kDirection = kLightPatterns + 1;
 constexpr std::uint32_t kPoints = WavePoints::kMost;
 
 constexpr std::array<std::uint8_t, kLanes> kOpen{};
@@ -47,7 +45,8 @@ struct Fixture {
         transport(grid),
         light(transport.light()),
         map(*transport.rays, grid.atlas, transport.texels),
-        scene{.transport = light, .kernels = kernels, .atlas = grid.atlas, .texels = transport.texels, .map = map} {
+        waves(transport.texels),
+        scene{.transport = light, .kernels = kernels, .atlas = grid.atlas, .texels = transport.texels, .map = map, .waves = waves} {
     scene.levels = {.count = 1, .base = 0, .endless = true};
     scene.lastDepth = 64;
     for (std::size_t t = 0; t < map.size(); ++t) {
@@ -64,12 +63,12 @@ struct Fixture {
   void findUneven() {
     const PageTexels& page = transport.texels[0];
     std::vector<std::uint8_t> uneven(page.size());
-    std::array<CacheLink, std::size_t{kLanes} * GatherWave::kWarmRays> links;
+    std::array<CacheLink, std::size_t{kLanes} * kWarmRays> links;
     for (std::size_t first = 0; first < page.size(); first += kLanes) {
       const std::size_t count = std::min<std::size_t>(kLanes, page.size() - first);
       GatheredWave counts;
       const auto warm =
-          GatherWave(scene, 0, first, count).warmUp(std::span(links).first(count * GatherWave::kWarmRays), counts);
+          WarmWave(scene, 0, first, count).warmUp(std::span(links).first(count * kWarmRays), counts);
       for (std::size_t i = 0; i < count; ++i) uneven[first + i] = warm[i].isUneven() ? 1 : 0;
     }
     map.setUneven(uneven);
@@ -84,6 +83,7 @@ struct Fixture {
   LightTransport light;
   RnmKernels kernels{Projection::Flat};
   TexelMap map;
+  Waves waves;
   GatherScene scene;
   std::vector<PackedColor> cache;
   std::vector<Vec3> reflected;        // the same for the naive loop

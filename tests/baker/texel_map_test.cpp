@@ -1,4 +1,4 @@
-#include "baker/gather/texel_cache.h"
+#include "baker/gather/texel_map.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,156 @@
+#include "baker/gather/gather_pass.h"
+
+#include <algorithm>
+#include <span>
+
+#include "baker/gather/each_wave.h"
+#include "baker/gather/gather_wave.h"
+#include "baker/gather/stopping.h"
+#include "scene/base/parallel.h"
+
+namespace lumel {
+namespace {
+
+constexpr std::size_t kTexelGrain = 4096;
+/// Whether more or less than half of a texel's rays meet backs is certain where the lead squared, in rays, is this many
+/// times their number: 2.8 standard deviations of a fair coin, and what eight rays of eight have.
+constexpr double kCertain = 8.0;
+/// Inside of something whose chart nobody sees texels darker than this share of the mean need no more samples.
+constexpr double kDarkInside = 0.01;
+
+float square(float x) { return x * x; }
+
+/// Adds what a wave gathered in samples [first, end).
+void store(const GatherScene& scene, GatherState& state, std::size_t index, const GatheredWave& gathered,
+           std::uint32_t first, std::uint32_t end) {
+  const Wave& wave = scene.waves[index];
+  std::array<float, 4>& moved = state.waves[index].moved;
+  moved = {};
+  std::array<float, kLanes> before{};
+  std::array<float, kLanes> now{};
+  std::uint32_t leftOut = 0;
+  for (std::size_t i = 0; i < wave.count; ++i) {
+    const GatheredTexel& texel = gathered.texels[i];
+    const std::size_t t = wave.start + i;
+    if (state.buried[t]) {
+      leftOut |= 1u << i;
+      continue;
+    }
+    state.samplesOf[t] = end;
+    Vec3& flat = state.sums.flat[t];
+    before[i] = luminance(flat) / static_cast<float>(std::max(1u, first));
+    flat += Vec3(texel.flat);
+    if (!state.seen.empty()) state.seen[t] += Vec3(texel.seen);
+    now[i] = luminance(flat) / static_cast<float>(end);
+    moved[0] += square(now[i] - before[i]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      Vec3& sum = state.sums.rnm[k][t];
+      const float mean = luminance(sum) / static_cast<float>(std::max(1u, first));
+      sum += Vec3(texel.rnm[k]);
+      moved[k + 1] += square(luminance(sum) / static_cast<float>(end) - mean);
+    }
+    if (!scene.levels.endless)
+      for (std::size_t l = 0; l < scene.stored(); ++l) state.levelSums[t * scene.stored() + l] += Vec3(texel.levels[l]);
+    state.backFaces[t] += texel.backFaces;
+    // The warm-up's rays and the first samples come from the same points.
+    if (first == 0 && end >= kWarmRays && scene.levels.count > 0)
+      state.inside[t].addPairs(state.warmBacks[t], texel.firstBacks);
+    state.inside[t].add(texel.inside);
+    if ((wave.first + i) % kProbeStride == 0)
+      for (std::size_t k = 0; k < kProbeNormals; ++k)
+        state.probes[scene.waves.probeOf(wave.page, wave.first + i)][k] += Vec3(texel.probes[k]);
+  }
+  state.errors.add(scene.waves, index, before, now, first, end - first, leftOut);
+  state.waves[index].samples = end;
+}
+
+/// Irradiance / pi as of level `level`, from all samples so far.
+Vec3 lightOf(const GatherScene& scene, const GatherState& state, std::size_t texel, std::size_t level) {
+  const Vec3& sum = scene.levels.endless ? state.sums.flat[texel] : state.levelSums[texel * scene.stored() + level];
+  const float weight = state.weightOf(texel);
+  const Vec3 gathered = sum / weight;
+  if (!scene.indirectOnly) return gathered;
+  return gathered + state.direct[texel] + state.seen[texel] / (static_cast<float>(kWarmRays) + weight);
+}
+
+}  // namespace
+
+Expected<void> gatherPass(const GatherScene& scene, GatherState& state, std::size_t firstWave, std::size_t lastWave,
+                          Progress& progress) {
+  const std::uint32_t first = state.samples, end = state.openEnd;
+  return forEachWave(firstWave, lastWave, state, progress, [&](std::size_t w, GatheredWave& done) {
+    const Wave& wave = scene.waves[w];
+    GatherState::OfWave& known = state.waves[w];
+    if (!known.done && known.samples >= end) return;
+    if (!known.done) {
+      const std::span buried = std::span(state.buried).subspan(wave.start, wave.count);
+      if (first == 0 || std::ranges::count(buried, 0) > 0) {
+        GatherWave texels(scene, wave.page, wave.first, wave.count);
+        texels.gather(first, end, state.radiance, buried, state.spreadsOf(scene, w), done);
+        for (std::size_t i = 0; i < wave.count; ++i) state.coverage[wave.start + i] = texels.coverage(i);
+      }
+      store(scene, state, w, done, first, end);
+    }
+    progress.advance(std::uint64_t{wave.count} * (end - first));
+  });
+}
+
+void closePass(const GatherScene& scene, GatherState& state) {
+  if (state.samples == 0) state.warmBacks = std::vector<std::uint8_t>();
+  state.samples = state.openEnd;
+  state.openEnd = 0;
+  std::stable_sort(state.nonFinite.begin() + static_cast<std::ptrdiff_t>(state.closedNonFinite), state.nonFinite.end(),
+                   [](const auto& a, const auto& b) { return a.wave < b.wave; });
+  state.closedNonFinite = state.nonFinite.size();
+  findBuried(scene, state);
+  std::vector<std::uint8_t> live(state.waves.size());
+  for (std::size_t w = 0; w < live.size(); ++w) live[w] = state.waves[w].done ? 0 : 1;
+  state.errors.endPass(scene.waves, live);
+}
+
+std::vector<TexelMap::Substitute> substitutesFor(const GatherScene& scene, const GatherState& state) {
+  std::vector<std::uint8_t> valid(scene.map.size());
+  std::vector<std::uint8_t> wanting(scene.map.size());
+  for (std::size_t t = 0; t < valid.size(); ++t) {
+    valid[t] = 2 * state.backFaces[t] <= state.samplesOf[t] ? 1 : 0;
+    // Of texels wholly inside only rays from inside see anything, and these must not bring the light out there to
+    // texels that are partly in the open.
+    wanting[t] = 16.0 * state.backFaces[t] < 15.0 * state.samplesOf[t] ? 1 : 0;
+  }
+  return scene.map.substitutes(wanting, valid);
+}
+
+void findBuried(const GatherScene& scene, GatherState& state) {
+  std::vector<std::uint8_t> hidden(scene.map.size());
+  std::vector<std::uint8_t> valid(scene.map.size());
+  for (std::size_t t = 0; t < valid.size(); ++t) {
+    const double lead = 2.0 * state.backFaces[t] - state.samplesOf[t];  // of rays that meet backs
+    const bool certain = lead * lead >= kCertain * state.samplesOf[t];
+    hidden[t] = certain && lead > 0.0 ? 1 : 0;
+    valid[t] = certain && lead < 0.0 ? 1 : 0;
+  }
+  const std::vector<std::uint8_t> replaced = scene.map.buried(hidden, valid);
+  const double dark = state.meanLuminance(kDarkInside);
+  for (std::size_t t = 0; t < hidden.size(); ++t) {
+    const bool judged = hidden[t] && state.samplesOf[t] >= kFirstJudged;
+    if (replaced[t] || (judged && static_cast<double>(luminance(state.meanLight(t))) < dark)) state.buried[t] = 1;
+  }
+}
+
+void renewCache(const GatherScene& scene, GatherState& state) {
+  const auto substitutes = substitutesFor(scene, state);
+  const std::size_t stored = scene.stored();
+  // The lowest level stays as the warm-up left it where it stands on others that are not kept.
+  const std::size_t firstLevel = scene.levels.base > 0 ? 1 : 0;
+  const auto renew = [&](std::size_t texel, std::size_t source) {
+    for (std::size_t l = firstLevel; l < stored; ++l)
+      state.radiance[texel * stored + l] =
+          packColor(unpackColor(state.reflectance[texel]) * lightOf(scene, state, source, l));
+  };
+  parallelFor(scene.map.size(), kTexelGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t t = first; t < last; ++t) renew(t, t);
+  });
+  for (const TexelMap::Substitute& s : substitutes) renew(s.texel, s.source);
+}
+
+}  // namespace lumel

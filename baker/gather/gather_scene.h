@@ -1,0 +1,60 @@
+// What a gather reads: the scene, its texels, and how many bounces of light the cache holds.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "baker/gather/packed_color.h"
+#include "baker/gather/texel_map.h"
+#include "baker/gather/waves.h"
+#include "baker/light/direct_light.h"
+#include "baker/light/light_transport.h"
+#include "lightmap/maps/projection.h"
+
+namespace lumel {
+
+/// Rays of the warm-up from every texel.
+inline constexpr int kWarmRays = 8;
+
+/// The light that the cache holds for every texel, by number of bounces. Level l holds light after base + l bounces;
+/// a bake of N bounces reads N - 1. `endless`: one level, which holds all bounces and is read by itself.
+struct CacheLevels {
+  static constexpr int kMost = 8;
+  int count = 0;  // levels stored; 0: nothing is looked up
+  int base = 0;
+  bool endless = false;
+
+  /// Level that a gather of `bounces` reads after `depth` more hits; -1: none.
+  int read(int bounces, int depth) const {
+    if (endless) return 0;
+    const int level = bounces - 1 - depth - base;
+    // Below the lowest level that is kept the light of a few bounces more stands in.
+    return level >= 0 ? level : (base > 0 ? 0 : -1);
+  }
+};
+
+/// What every wave reads, and what stays the same from pass to pass.
+struct GatherScene {
+  const LightTransport& transport;
+  const RnmKernels& kernels;
+  const Atlas& atlas;
+  const std::vector<PageTexels>& texels;
+  const TexelMap& map;
+  const Waves& waves;
+  std::uint64_t seed = 1;
+  int bounces = 0;    // of the result; with endless levels unused
+  int lastDepth = 0;  // GatherTracer
+  CacheLevels levels{};
+  bool indirectOnly = false;
+  std::optional<TraceMode> gatherMode{};       // of the texels' rays; else as CoherencePilot says
+  std::vector<LightStrategy> strategies{};     // of the texels' own light
+  std::span<const PackedColor> reflectance{};  // of the map's texels, once the warm-up has found it
+
+  /// Levels of the cache, as the length of a row.
+  std::size_t stored() const { return static_cast<std::size_t>(levels.count); }
+};
+
+}  // namespace lumel

@@ -1,0 +1,124 @@
+// All that a gather knows between two waves, as plain data: it can be written at any time when no wave is being worked
+// on, in the middle of a pass too, and gathering goes on from what was read with the same result, bit for bit.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <iosfwd>
+#include <span>
+#include <vector>
+
+#include "baker/gather/doubling_error.h"
+#include "baker/gather/gather_scene.h"
+#include "baker/gather/inside_points.h"
+#include "baker/gather/light_effort.h"
+#include "baker/gather/packed_color.h"
+#include "baker/rays/non_finite.h"
+#include "lightmap/maps/projection_probe.h"
+#include "scene/base/expected.h"
+
+namespace lumel {
+
+struct GatherOptions {
+  int samples = 1;     // per texel; with a time budget the most, with a target error the least
+  int maxSamples = 1;  // with a target error: the most
+  int bounces = -1;    // indirect bounces; negative: all that matter
+  bool indirectOnly = false;
+  std::uint64_t seed = 1;
+  float targetError = 0.0f;        // relative standard error at which a wave of texels is done; 0: none
+  bool adaptive = false;           // without a target: a wave is done where more samples would not be seen
+  double timeBudgetSeconds = 0.0;  // no pass is begun that would probably end later; 0: none
+};
+
+/// Light of all texels, numbered through as in TexelMap: a vector for each map, so that each can be freed once its
+/// image is made.
+struct TexelLight {
+  std::vector<Vec3> flat;
+  std::array<std::vector<Vec3>, 3> rnm;
+
+  void resize(std::size_t count);
+};
+
+struct GatherState {
+  struct OfWave {
+    std::uint32_t samples = 0;  // it has taken [0, samples) of each of its texels
+    std::uint32_t done = 0;     // 1: as good as its goal
+    // For the flat map and the others: sum over texels of the square of how far their means moved in the last pass.
+    std::array<float, 4> moved{};
+  };
+  struct NonFiniteOfWave {
+    std::uint32_t wave = 0;
+    NonFiniteSample sample;
+  };
+
+  std::uint32_t samples = 0;      // of the passes that are closed
+  std::uint32_t openEnd = 0;      // where the samples of the open pass end; 0: none is open
+  std::uint32_t isWarm = 0;       // 1: the warm-up is over
+  double seconds = 0.0;           // spent so far
+  double passBegan = 0.0;         // seconds when the open pass began
+  double secondsPerSample = 0.0;  // of the last pass that was closed
+
+  std::vector<OfWave> waves;
+  std::vector<LightSpread> spreads;  // per wave: of each of GatherScene::strategies, and of the gather rays
+  DoublingError errors;
+
+  // Sums over all samples so far, per texel:
+  TexelLight sums;
+  std::vector<Vec3> levelSums;                          // levels.count per texel, unless endless
+  std::vector<std::array<Vec3, kProbeNormals>> probes;  // of Waves::probes
+  std::vector<std::uint32_t> backFaces;                 // rays that met backs
+  std::vector<InsideTally> inside;
+  std::vector<std::uint32_t> samplesOf;
+  std::vector<float> coverage;
+  std::vector<std::uint8_t> buried;     // 1: nothing more is gathered for the texel
+  std::vector<std::uint8_t> warmBacks;  // bits of the warm-up's rays that met backs; empty once the first pass is done
+
+  // The cache, per texel:
+  std::vector<PackedColor> reflectance;
+  std::vector<PackedColor> radiance;  // that the texel reflects: levels.count each
+  std::vector<std::uint8_t> uneven;   // WarmTexel::isUneven
+  // With indirectOnly alone: light from light samples; sums of what the rays of all passes saw shine.
+  std::vector<Vec3> direct;
+  std::vector<Vec3> seen;
+
+  std::uint64_t rays = 0;
+  std::uint64_t shadowRays = 0;
+  std::vector<NonFiniteOfWave> nonFinite;  // of closed passes, and behind them of the open one in any order
+  std::uint64_t closedNonFinite = 0;       // how many of them are of closed passes
+
+  /// A gather that has not begun.
+  explicit GatherState(const GatherScene& scene);
+  GatherState() = default;
+  /// Makes room for what the passes sum up: after the warm-up, whose links are gone by then.
+  void makeSums(const GatherScene& scene);
+  /// Frees what only further passes need.
+  void dropCache();
+  /// Whether all vectors are as long as the scene needs them.
+  bool fits(const GatherScene& scene) const;
+  std::uint64_t samplesTaken(const GatherScene& scene) const;
+
+  std::span<LightSpread> spreadsOf(const GatherScene& scene, std::size_t wave);
+  /// Samples of a texel that count: those from points in the open.
+  float weightOf(std::size_t texel) const;
+  /// Irradiance / pi of the flat map.
+  Vec3 meanLight(std::size_t texel) const { return sums.flat[texel] / weightOf(texel); }
+  /// `share` of the mean luminance over all texels; 0 before there are samples.
+  double meanLuminance(double share = 1.0) const;
+  /// Standard error of the flat map's luminance at texel `i` of a wave.
+  float errorOf(const Waves& waves, std::size_t wave, std::size_t i) const;
+};
+
+/// Tells one gather from others: a hash of its options, texels and surfaces, for readState. What else a scene holds is
+/// for the caller to compare.
+std::uint64_t gatherKey(const GatherScene& scene, const GatherOptions& options);
+
+/// Writes a state: a version, the key, all members and a checksum, in the byte order of this machine. Errors: Failed
+/// (the stream does not take it).
+Expected<void> writeState(const GatherState& state, std::uint64_t key, std::ostream& out);
+
+/// Reads what writeState wrote. Errors: Input, if it is no state, of another version, of another gather (its key
+/// differs), cut off or damaged. A count that is wrong asks for no more memory than twice what the stream holds.
+Expected<GatherState> readState(std::istream& in, std::uint64_t key);
+
+}  // namespace lumel

@@ -1,0 +1,167 @@
+#include "baker/gather/warm_up.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "baker/gather/each_wave.h"
+#include "baker/gather/gather_pass.h"
+#include "baker/gather/warm_links.h"
+#include "baker/gather/warm_wave.h"
+#include "scene/base/parallel.h"
+
+namespace lumel {
+namespace {
+
+/// Endless light: the warm-up ends where another bounce adds less than this share, or changes what all of them come to
+/// by less; or after so many. No more than kMostBeyond of the light is from bounces that were not followed, since rooms
+/// that are lit through others get theirs late; and none where each bounce has more than kSlowest of the light of the
+/// one before.
+constexpr double kSettled = 1e-4;
+constexpr double kMostBeyond = 0.002;
+constexpr double kSlowest = 0.98;
+constexpr int kMostSweeps = 256;
+constexpr std::size_t kTexelGrain = 4096;
+constexpr std::size_t kWaveGrain = kTexelGrain / kLanes;
+
+/// The light that is passed along links.
+class Sweeping {
+ public:
+  /// `first`: irradiance / pi to begin with; `constant`: what every sweep finds again, links apart.
+  Sweeping(const GatherScene& scene, GatherState& state, const WarmLinks& links, std::vector<Vec3> first,
+           std::span<const Vec3> constant)
+      : scene_(scene),
+        state_(state),
+        links_(links),
+        substitutes_(substitutesFor(scene, state)),
+        light_(std::move(first)),
+        constant_(constant),
+        reflected_(light_.size()) {}
+
+  /// Sweeps until the light has settled, or as many times as the cache has levels, and fills the cache.
+  void run();
+
+ private:
+  void reflect(float beyond);
+  double sweep();
+  void keep(int level);
+
+  const GatherScene& scene_;
+  GatherState& state_;
+  const WarmLinks& links_;
+  const std::vector<TexelMap::Substitute> substitutes_;
+  std::vector<Vec3> light_;
+  const std::span<const Vec3> constant_;
+  // What links look up: one product instead of two values from all over the memory.
+  std::vector<PackedColor> reflected_;
+};
+
+/// Finds what texels reflect of their light, and adds `beyond` times more of what the last sweep added to it.
+void Sweeping::reflect(float beyond) {
+  for (const TexelMap::Substitute& s : substitutes_) light_[s.texel] = light_[s.source];
+  parallelFor(light_.size(), kTexelGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t t = first; t < last; ++t) {
+      Vec3 now = unpackColor(state_.reflectance[t]) * light_[t];
+      if (beyond > 0.0f) now += beyond * glm::max(now - unpackColor(reflected_[t]), Vec3(0.0f));
+      reflected_[t] = packColor(now);
+    }
+  });
+}
+
+/// Passes on what texels reflect. Returns the sum of all light.
+double Sweeping::sweep() {
+  const Waves& waves = scene_.waves;
+  std::vector<double> parts((waves.size() + kWaveGrain - 1) / kWaveGrain);
+  parallelFor(waves.size(), kWaveGrain, [&](std::size_t first, std::size_t last) {
+    double sum = 0.0;
+    for (std::size_t w = first; w < last; ++w) {
+      const std::size_t start = waves[w].start;
+      WarmLinks::Reader link(links_, w, start * kWarmRays);
+      for (std::size_t t = start; t < start + waves[w].count; ++t) {
+        Vec3 found(0.0f);
+        for (int ray = 0; ray < kWarmRays; ++ray, link.next())
+          if (link.isTexel()) found += link.lightOf(reflected_);
+        light_[t] = constant_[t] + found / static_cast<float>(kWarmRays);
+        sum += static_cast<double>(luminance(light_[t]));
+      }
+    }
+    parts[first / kWaveGrain] = sum;
+  });
+  double total = 0.0;
+  for (const double part : parts) total += part;
+  return total;
+}
+
+void Sweeping::keep(int level) {
+  for (std::size_t t = 0; t < reflected_.size(); ++t)
+    state_.radiance[t * scene_.stored() + static_cast<std::size_t>(level)] = reflected_[t];
+}
+
+void Sweeping::run() {
+  const CacheLevels& levels = scene_.levels;
+  reflect(0.0f);
+  if (!levels.endless && levels.base == 0) keep(0);
+  const int sweeps = levels.endless ? kMostSweeps : levels.base + levels.count - 1;
+  double before = 0.0, addedBefore = 0.0, limitBefore = 0.0;
+  for (int number = 1; number <= sweeps; ++number) {
+    const double total = sweep();
+    // In the end every sweep adds the same share of what the one before it did, and the rest is a geometric series.
+    const double added = total - before;
+    const double ratio = addedBefore > 0.0 ? std::clamp(added / addedBefore, 0.0, kSlowest) : kSlowest;
+    const double rest = added * ratio / (1.0 - ratio);
+    const bool known = rest <= kMostBeyond * total && std::abs(total + rest - limitBefore) <= kSettled * total;
+    const bool settled = levels.endless && (known || added <= kSettled * total);
+    reflect(settled && known ? static_cast<float>(ratio / (1.0 - ratio)) : 0.0f);
+    if (settled) break;
+    if (!levels.endless && number >= levels.base) keep(number - levels.base);
+    before = total;
+    addedBefore = added;
+    limitBefore = total + rest;
+  }
+  if (levels.endless) state_.radiance = std::move(reflected_);
+}
+
+}  // namespace
+
+Expected<void> warmUp(const GatherScene& scene, GatherState& state, Progress& progress) {
+  const std::size_t count = scene.map.size();
+  WarmLinks links(count, scene.waves.size());
+  std::vector<Vec3> first(count);     // light that needs no texel to be known: direct, and what rays see shine
+  std::vector<Vec3> constant(count);  // the same and light from hits without texels
+  state.uneven.resize(count);
+  auto traced = forEachWave(0, scene.waves.size(), state, progress, [&](std::size_t w, GatheredWave& counts) {
+    const Wave& wave = scene.waves[w];
+    const std::size_t linkCount = std::size_t{wave.count} * kWarmRays;
+    WarmWave texels(scene, wave.page, wave.first, wave.count);
+    std::array<CacheLink, std::size_t{kLanes} * kWarmRays> found;
+    const auto warm = texels.warmUp(std::span(found).first(linkCount), counts);
+    links.keep(w, std::size_t{wave.start} * kWarmRays, std::span(found).first(linkCount));
+    for (std::size_t i = 0; i < wave.count; ++i) {
+      const std::size_t t = wave.start + i;
+      state.reflectance[t] = packColor(warm[i].reflectance);
+      first[t] = warm[i].direct + warm[i].seen;
+      constant[t] = first[t] + warm[i].relit;
+      state.warmBacks[t] = static_cast<std::uint8_t>(warm[i].backs);
+      state.backFaces[t] = static_cast<std::uint32_t>(std::popcount(warm[i].backs));
+      state.uneven[t] = warm[i].isUneven() ? 1 : 0;
+      if (!scene.indirectOnly) continue;
+      state.direct[t] = warm[i].direct;
+      state.seen[t] = warm[i].seen * static_cast<float>(kWarmRays);
+    }
+  });
+  if (!traced) return traced;
+  std::fill(state.samplesOf.begin(), state.samplesOf.end(), std::uint32_t{kWarmRays});
+  findBuried(scene, state);
+  Sweeping(scene, state, links, std::move(first), constant).run();
+  for (std::size_t t = 0; t < count; ++t)
+    if (!state.buried[t]) {
+      state.backFaces[t] = 0;
+      state.samplesOf[t] = 0;
+    }
+  return {};
+}
+
+}  // namespace lumel

@@ -1,0 +1,16 @@
+// The start of the cache, before the first pass.
+#pragma once
+
+#include "baker/gather/gather_scene.h"
+#include "baker/gather/gather_state.h"
+#include "scene/base/expected.h"
+#include "scene/base/progress.h"
+
+namespace lumel {
+
+/// Fills the cache of a gather that has not begun: light samples and kWarmRays rays of every texel are taken once, and
+/// the light of one bounce after another is passed along these rays without tracing more. Errors: Interrupted; the
+/// state is then of no use.
+Expected<void> warmUp(const GatherScene& scene, GatherState& state, Progress& progress);
+
+}  // namespace lumel

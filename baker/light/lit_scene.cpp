@@ -1,0 +1,27 @@
+#include "baker/light/lit_scene.h"
+
+#include <utility>
+
+namespace lumel {
+
+LitScene::LitScene(const Scene& scene, std::unique_ptr<Materials> materials, std::unique_ptr<RayScene> rays,
+                   std::vector<std::string> notes, bool hasAlbedo)
+    : notes_(std::move(notes)),
+      hasAlbedo_(hasAlbedo),
+      materials_(std::move(materials)),
+      rays_(std::move(rays)),
+      punctual_(scene.lights),
+      emissive_(*rays_, *materials_),
+      environment_(scene.environment),
+      transport_{*rays_, *materials_, punctual_, emissive_, environment_} {}
+
+Expected<std::unique_ptr<LitScene>> LitScene::build(const Scene& scene, bool needsAlbedo) {
+  std::vector<std::string> notes;
+  auto materials = std::make_unique<Materials>(scene, needsAlbedo, notes);
+  auto rays = RayScene::build(scene, *materials);
+  if (!rays) return rays.error();
+  return std::unique_ptr<LitScene>(
+      new LitScene(scene, std::move(materials), *std::move(rays), std::move(notes), needsAlbedo));
+}
+
+}  // namespace lumel
