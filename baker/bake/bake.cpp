@@ -40,8 +40,8 @@ struct WaveStats {
   std::size_t residuals = 0;
 };
 
-/// Enters a texel's aux pixel and figures; `rnm` as stored.
-void storeAux(Image& aux, TexelCoord at, const BakedTexel& texel, const Vec3& flat, const std::array<Vec3, 3>& rnm,
+/// Enters a texel's aux pixel and figures.
+void storeAux(Image& aux, TexelCoord at, const BakedTexel& texel, const Encoding& encoding, const SampleValue& stored,
               WaveStats& stats) {
   float* pixel = aux.at(at.x, at.y);
   pixel[0] = texel.coverage;
@@ -51,19 +51,19 @@ void storeAux(Image& aux, TexelCoord at, const BakedTexel& texel, const Vec3& fl
   stats.mostSamples = std::max(stats.mostSamples, texel.samples);
   if (texel.validity < 0.5f) return;
   ++stats.validTexels;
-  stats.luminance += static_cast<double>(luminance(flat));
+  stats.luminance += static_cast<double>(luminance(stored.flat));
   stats.standardError += static_cast<double>(texel.standardError);
   if (!texel.probed) return;
   for (std::size_t i = 0; i < kProbeNormals; ++i) {
     const auto difference =
-        static_cast<double>(luminance(decodeRnm(rnm, probeNormals()[i])) - luminance(texel.probes[i]));
+        static_cast<double>(luminance(encoding.decode(stored.maps, probeNormals()[i])) - luminance(texel.probes[i]));
     stats.residualSquares += difference * difference;
     ++stats.residuals;
   }
 }
 
-/// Of path tracing.
-void storeTexel(BakedPage& page, TexelCoord at, const TexelResult& texel, Projection projection, WaveStats& stats) {
+/// Stores the result of a path-traced texel.
+void storeTexel(BakedPage& page, TexelCoord at, const TexelResult& texel, const Encoding& encoding, WaveStats& stats) {
   if (!(texel.coverage > 0.0f)) return;
   BakedTexel baked{.coverage = texel.coverage,
                    .validity = texel.sums.validity(),
@@ -72,11 +72,11 @@ void storeTexel(BakedPage& page, TexelCoord at, const TexelResult& texel, Projec
   if (baked.probed)
     for (std::size_t i = 0; i < kProbeNormals; ++i)
       baked.probes[i] = Vec3(texel.probes[i] / static_cast<double>(baked.samples));
-  const SampleValue value = texel.sums.mean();
-  const std::array<Vec3, 3> rnm = finishTexel(projection, value.rnm, value.flat);
-  for (std::size_t i = 0; i < 3; ++i) page.rnm[i].setRgb(at.x, at.y, rnm[i]);
+  SampleValue value = texel.sums.mean();
+  encoding.finish(std::span(value.maps).first(encoding.mapCount()), value.flat);
+  for (std::size_t i = 0; i < page.maps.size(); ++i) page.maps[i].setRgb(at.x, at.y, value.maps[i]);
   page.flat.setRgb(at.x, at.y, value.flat);
-  storeAux(page.aux, at, baked, value.flat, rnm, stats);
+  storeAux(page.aux, at, baked, encoding, value, stats);
 }
 
 /// Fewest samples of which an error is known.
@@ -128,16 +128,17 @@ constexpr std::size_t kTexelGrain = 1024;
 
 /// Finishes the light of a page's texels [first, last) and stores all but the maps.
 void finishTexels(const GatherIntegrator& integrator, const GatherState& state, std::uint32_t page,
-                  const PageTexels& texels, std::size_t first, std::size_t last, Projection projection,
+                  const PageTexels& texels, std::size_t first, std::size_t last, const Encoding& encoding,
                   TexelLight& light, Image& aux, WaveStats& stats) {
   for (std::size_t i = first; i < last; ++i) {
     const BakedTexel texel = integrator.texel(state, page, i);
     if (!(texel.coverage > 0.0f)) continue;
     const std::size_t t = integrator.firstOfPage(page) + i;
-    std::array<Vec3, 3> rnm = {light.rnm[0][t], light.rnm[1][t], light.rnm[2][t]};
-    rnm = finishTexel(projection, rnm, light.flat[t]);
-    for (std::size_t k = 0; k < 3; ++k) light.rnm[k][t] = rnm[k];
-    storeAux(aux, texels.coords[i], texel, light.flat[t], rnm, stats);
+    SampleValue value{.flat = light.flat[t]};
+    for (std::size_t k = 0; k < encoding.mapCount(); ++k) value.maps[k] = light.maps[k][t];
+    encoding.finish(std::span(value.maps).first(encoding.mapCount()), value.flat);
+    for (std::size_t k = 0; k < encoding.mapCount(); ++k) light.maps[k][t] = value.maps[k];
+    storeAux(aux, texels.coords[i], texel, encoding, value, stats);
   }
 }
 
@@ -179,10 +180,11 @@ WaveStats countsOf(const GatherState& state) {
   return stats;
 }
 
-Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
+Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const Atlas& atlas,
                                         const std::vector<PageTexels>& texels, const BakeOptions& options,
                                         GatherSession& session, std::vector<BakedPage>& pages, Progress& progress) {
-  std::optional<GatherIntegrator> integrator(std::in_place, transport, kernels, atlas, texels,
+  const Encoding& encoding = *options.encoding;
+  std::optional<GatherIntegrator> integrator(std::in_place, transport, encoding, atlas, texels,
                                              gatherOptionsOf(options));
   if (!session.state) session.state = integrator->begin();
   GatherState& state = *session.state;
@@ -198,7 +200,7 @@ Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const R
     const std::size_t before = stats.size();
     stats.resize(before + (texels[p].size() + kTexelGrain - 1) / kTexelGrain);
     parallelFor(texels[p].size(), kTexelGrain, [&](std::size_t first, std::size_t last) {
-      finishTexels(*integrator, state, static_cast<std::uint32_t>(p), texels[p], first, last, options.projection, light,
+      finishTexels(*integrator, state, static_cast<std::uint32_t>(p), texels[p], first, last, encoding, light,
                    pages[p].aux, stats[before + first / kTexelGrain]);
     });
   }
@@ -208,7 +210,9 @@ Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const R
     std::vector<Image> images = takeMap(map, atlas, texels);
     for (std::size_t p = 0; p < pages.size(); ++p) imageOf(pages[p]) = std::move(images[p]);
   };
-  for (std::size_t k = 0; k < 3; ++k) take(light.rnm[k], [k](BakedPage& page) -> Image& { return page.rnm[k]; });
+  for (BakedPage& page : pages) page.maps.resize(encoding.mapCount());
+  for (std::size_t k = 0; k < encoding.mapCount(); ++k)
+    take(light.maps[k], [k](BakedPage& page) -> Image& { return page.maps[k]; });
   take(light.flat, [](BakedPage& page) -> Image& { return page.flat; });
   return stats;
 }
@@ -246,19 +250,19 @@ void storePathErrors(const Waves& waves, const std::vector<WaveMeans>& means, in
     }
 }
 
-Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, const RnmKernels& kernels,
-                                            const Atlas& atlas, const std::vector<PageTexels>& texels,
-                                            const BakeOptions& options, std::vector<BakedPage>& pages,
-                                            Progress& progress) {
-  const PathIntegrator integrator(transport, kernels, atlas,
+Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, const Atlas& atlas,
+                                            const std::vector<PageTexels>& texels, const BakeOptions& options,
+                                            std::vector<BakedPage>& pages, Progress& progress) {
+  const Encoding& encoding = *options.encoding;
+  const PathIntegrator integrator(transport, encoding, atlas,
                                   {.samples = std::max(1, options.samples),
                                    .bounces = options.bounces,
                                    .indirectOnly = options.indirectOnly,
                                    .seed = options.seed});
   pages.resize(atlas.pages.size());
   for (std::size_t p = 0; p < pages.size(); ++p) {
-    for (Image* image : {&pages[p].rnm[0], &pages[p].rnm[1], &pages[p].rnm[2], &pages[p].flat})
-      *image = pageImage(atlas, p, 3);
+    pages[p].flat = pageImage(atlas, p, 3);
+    pages[p].maps.assign(encoding.mapCount(), pages[p].flat);
     pages[p].aux = pageImage(atlas, p, 4);
   }
   const Waves waves(texels);
@@ -281,7 +285,7 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
       for (std::size_t m = 0; m < kMarks.size(); ++m)
         for (std::size_t i = 0; i < wave.count; ++i) means[w][m][i] = done.texels[i].sums.luminanceBefore(kMarks[m]);
       for (std::size_t i = 0; i < wave.count; ++i)
-        storeTexel(pages[wave.page], page.coords[wave.first + i], done.texels[i], options.projection, stats);
+        storeTexel(pages[wave.page], page.coords[wave.first + i], done.texels[i], encoding, stats);
       progress.advance(wave.count);
     }
   });
@@ -317,14 +321,13 @@ Expected<BakeResult> bake(const LitScene& scene, const Atlas& atlas, const std::
   LUMEL_CHECK(scene.hasAlbedo() || askedFor.bounces == 0);
   const Stopwatch sinceStart;
   const LightTransport& transport = scene.transport();
-  const RnmKernels kernels(askedFor.projection);
   const BakeOptions options = optionsFor(transport, askedFor);
   BakeResult result;
   GatherSession alone;
-  const auto waveStats = options.integrator == Integrator::Gather
-                             ? gather(transport, kernels, atlas, texels, options, session != nullptr ? *session : alone,
-                                      result.pages, progress)
-                             : tracePaths(transport, kernels, atlas, texels, options, result.pages, progress);
+  const auto waveStats =
+      options.integrator == Integrator::Gather
+          ? gather(transport, atlas, texels, options, session != nullptr ? *session : alone, result.pages, progress)
+          : tracePaths(transport, atlas, texels, options, result.pages, progress);
   if (!waveStats) return waveStats.error();
 
   result.stats = sumUp(*waveStats, options);
@@ -336,7 +339,6 @@ Expected<BakeResult> bake(const LitScene& scene, const Atlas& atlas, const std::
 
 std::uint64_t sessionKey(const LitScene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
                          const BakeOptions& askedFor) {
-  const RnmKernels kernels(askedFor.projection);
   const BakeOptions options = optionsFor(scene.transport(), askedFor);
   return GatherIntegrator(scene.transport(), kernels, atlas, texels, gatherOptionsOf(options)).key();
 }

@@ -1,7 +1,6 @@
-// The main job: irradiance at every texel of an atlas, projected onto the RNM basis.
+// The main job: irradiance at every texel of an atlas, as the maps of an encoding.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -19,8 +18,8 @@ namespace lumel {
 
 /// One atlas page. All images have the page's size; texels without coverage are 0 everywhere.
 struct BakedPage {
-  std::array<Image, 3> rnm;  // RGB
-  Image flat;                // RGB: irradiance / pi
+  std::vector<Image> maps;  // RGB: those of BakeOptions::encoding, in their order
+  Image flat;               // RGB: irradiance / pi
   // Channels of aux, in order: coverage (area share 0..1), validity (share of gather rays that met no back of a
   // single-sided surface), stderr (standard error of the flat map's luminance), samples (those taken of this texel:
   // fewer where its error has settled, or where it is inside of something).

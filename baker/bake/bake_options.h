@@ -2,9 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
-#include "lightmap/maps/projection.h"
+#include "lightmap/maps/encoding.h"
 
 namespace lumel {
 
@@ -33,7 +34,7 @@ struct BakeOptions {
   float timeBudgetSeconds = 0.0f;
   bool indirectOnly = false;  // without what arrives straight from lights, shining surfaces and the sky
   std::uint64_t seed = 1;
-  Projection projection = Projection::Flat;
+  std::shared_ptr<const Encoding> encoding = rnmEncoding();
 };
 
 /// Names as they stand in files and messages.

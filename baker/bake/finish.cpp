@@ -63,21 +63,20 @@ void denoisePage(BakedPage& page, const PageState& state) {
   std::vector<std::uint32_t> charts = state.chartIds;
   for (std::size_t i = 0; i < charts.size(); ++i)
     if (state.valid.known[i] == 0) charts[i] = 0;
-  denoise(page.flat, page.rnm, charts, state.normals, std::span(page.aux.pixels).subspan(2), 4);
+  denoise(page.flat, page.maps, charts, state.normals, std::span(page.aux.pixels).subspan(2), 4);
 }
 
 }  // namespace
 
 void finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels,
                  const FinishOptions& options) {
-  constexpr std::size_t kMaps = 4;
   for (std::size_t p = 0; p < pages.size(); ++p) {
     BakedPage& page = pages[p];
     const PageState state = stateOf(page, atlas, texels[p], options.denoise);
     if (options.denoise) denoisePage(page, state);
-    parallelFor(kMaps, 1, [&](std::size_t first, std::size_t last) {
+    parallelFor(page.maps.size() + 1, 1, [&](std::size_t first, std::size_t last) {
       for (std::size_t i = first; i < last; ++i) {
-        Image& map = i < 3 ? page.rnm[i] : page.flat;
+        Image& map = i < page.maps.size() ? page.maps[i] : page.flat;
         if (state.hasHoles) fillHoles(map, state.valid, state.chartIds, state.holes);
         TexelMask known = state.covered;
         if (options.rings > 0) dilate(map, known, options.rings);

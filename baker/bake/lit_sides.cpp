@@ -122,7 +122,8 @@ class SideAtlas {
   Expected<std::vector<double>> light(const Scene& scene, const Sides& asked, int samples, Progress& progress) const {
     std::vector<double> sums(asked.size(), 0.0);
     if (texels_.empty()) return sums;
-    const BakeOptions options{.integrator = Integrator::Path, .samples = samples, .bounces = kBounces};
+    const BakeOptions options{
+        .integrator = Integrator::Path, .samples = samples, .bounces = kBounces, .encoding = flatEncoding()};
     const auto baked = bake(scene, atlas_, findTexels(atlas_), options, progress);
     if (!baked) return baked.error();
     const Image& flat = baked->pages[0].flat;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "baker/bake/bake_options.h"
 #include "baker/light/environment_light.h"
 #include "scene/images/image_io.h"
 
@@ -13,13 +14,16 @@ namespace {
 constexpr double kBase = 145e6;
 
 // Bytes per covered texel and per texel of the pages, and what is resident then.
-// Sampling: places 16, sums 48, reflectance 8, cache 8, counts 22, errors 13, figures of waves 10; the map from pages
-// to texels. The warm-up before it takes less: its links are 32.
-constexpr double kSamplingPerCovered = 125.0;
+// Sampling: places 16, the flat map's sums 12, reflectance 8, cache 8, counts 22, errors 13, figures of waves 10; the
+// map from pages to texels. The warm-up before it takes less: its links are 32.
+constexpr double kSamplingPerCovered = 89.0;
 constexpr double kSamplingPerPageTexel = 0.5;
-// Finishing: places; the five images 64, what the denoiser knows of texels and its strips 17, charts and masks.
+// Finishing: places; the flat and the aux image 28, what the denoiser knows of texels and its strips 17, charts and
+// masks.
 constexpr double kFinishingPerCovered = 16.0;
-constexpr double kFinishingPerPageTexel = 88.0;
+constexpr double kFinishingPerPageTexel = 52.0;
+// A map of the encoding: its sums, and then its image.
+constexpr double kPerMap = 12.0;
 
 // Bytes per triangle. Charts: the scene 24 and more, half-edges 31, the tree of merges 8; of one chart its mesh 34,
 // places and their moves 16, factor and what belongs to it 78. Sampling: the scene and its surfaces
@@ -35,6 +39,7 @@ constexpr double kPerSkyCell = 18.0;
 
 BakeSize sceneSize(const Scene& scene) {
   BakeSize size;
+  size.maps = static_cast<double>(BakeOptions{}.encoding->mapCount());
   for (const Instance& instance : scene.instances)
     for (const Primitive& primitive : scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives)
       size.triangles += static_cast<double>(primitive.triangleCount());
@@ -60,11 +65,12 @@ BakeSize sceneSize(const Scene& scene) {
 double bakeMemory(const BakeSize& size) {
   const double charts = kChartsPerTriangle * size.triangles;
   const double sampling = kSamplingPerTriangle * size.triangles + kPerDecodedTexel * size.decodedTexels +
-                          kSamplingPerCovered * size.coveredTexels + kSamplingPerPageTexel * size.pageTexels +
-                          kPerSkyCell * size.skyCells;
+                          (kSamplingPerCovered + kPerMap * size.maps) * size.coveredTexels +
+                          kSamplingPerPageTexel * size.pageTexels + kPerSkyCell * size.skyCells;
   // scene.glb holds the encoded images once more, while it is written.
   const double finishing = size.encodedBytes + kFinishingPerTriangle * size.triangles +
-                           kFinishingPerCovered * size.coveredTexels + kFinishingPerPageTexel * size.pageTexels;
+                           kFinishingPerCovered * size.coveredTexels +
+                           (kFinishingPerPageTexel + kPerMap * size.maps) * size.pageTexels;
   return kBase + size.encodedBytes + kPerSkyPixel * size.skyPixels + std::max({charts, sampling, finishing});
 }
 

@@ -7,6 +7,7 @@ namespace lumel {
 
 /// What a bake's memory depends on.
 struct BakeSize {
+  double maps = 0.0;  // of the encoding
   double pageTexels = 0.0;
   double coveredTexels = 0.0;
   double triangles = 0.0;      // of all instances
@@ -16,7 +17,8 @@ struct BakeSize {
   double skyCells = 0.0;       // of EnvironmentLight
 };
 
-/// Triangles, images and sky of a scene; texels are left at 0.
+/// Triangles, images and sky of a scene, baked with the encoding that bakes have unless told otherwise; texels are left
+/// at 0.
 BakeSize sceneSize(const Scene& scene);
 
 /// Peak resident memory of `lumel bake` in bytes, the program and its libraries included. README has the model and how

@@ -10,7 +10,6 @@
 #include "baker/commands/command.h"
 #include "baker/commands/scene_arguments.h"
 #include "baker/commands/stage_clock.h"
-#include "baker/files/names/conventions.h"
 #include "baker/files/names/file_names.h"
 #include "baker/files/read/earlier_layout.h"
 #include "baker/files/write/bake_files.h"
@@ -43,6 +42,7 @@ struct BakeArguments : SceneArguments {
   int threads = 0;
   Quality quality = Quality::Production;
   int samples = 0;  // 0: as the quality has it
+  Projection projection = Projection::Flat;
 };
 
 void declareLightOptions(OptionTable& options, BakeArguments& a) {
@@ -70,7 +70,7 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
                "Leave out light that comes straight from lights, shining surfaces and the sky: the program that shows "
                "the scene adds it");
   declareSkyAndSides(options, a);
-  options.choice("projection", a.bake.projection, {"raw", "flat", "fit"},
+  options.choice("projection", a.projection, {"raw", "flat", "fit"},
                  "How light is spread over the three maps: as in the literature (raw), scaled so that a flat normal is "
                  "exact (flat), least squares (fit)");
   options.integer("seed", a.bake.seed, "Seed of the sampling; the same seed gives the same bytes");
@@ -169,6 +169,7 @@ BakeRecord recordOf(const BakeArguments& a, int dilate, nlohmann::ordered_json s
   record.atlasOptions = a.atlas;
   record.bakeOptions = a.bake;
   record.bakeOptions.samples = samplesOf(a);
+  record.bakeOptions.encoding = rnmEncoding(a.projection);
   record.dilate = dilate;
   record.half = a.half;
   record.threads = availableThreads();

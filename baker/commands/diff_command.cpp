@@ -171,6 +171,21 @@ Expected<void> checkCharts(const DiffArguments& a, const Json& first, const Json
   return {};
 }
 
+/// The images that both bakes have: the maps of their encoding and the flat one; where they have not the same encoding,
+/// the flat one alone.
+Expected<std::vector<std::string>> commonKinds(const DiffArguments& a, const Json& first, const Json& second,
+                                               bool quiet) {
+  const auto one = encodingOf(first, (a.a / "bake.json").string());
+  if (!one) return one.error();
+  const auto other = encodingOf(second, (a.b / "bake.json").string());
+  if (!other) return other.error();
+  if ((*one)->name() == (*other)->name()) return lightKinds((*one)->mapNames());
+  if (!quiet)
+    std::fprintf(stderr, "lumel: warning: %s is encoded as %s, %s as %s: only their flat maps are compared\n",
+                 a.a.c_str(), (*one)->name().c_str(), a.b.c_str(), (*other)->name().c_str());
+  return lightKinds({});
+}
+
 Expected<void> diffBakes(const DiffArguments& a, CommandContext& context) {
   const auto first = readBakeJson(a.a);
   if (!first) return first.error();
@@ -181,6 +196,8 @@ Expected<void> diffBakes(const DiffArguments& a, CommandContext& context) {
     return inputError(a.a.string() + " has " + std::to_string(pages) + " pages, " + a.b.string() + " has " +
                       std::to_string(second->value("pages", Json::array()).size()) + "; they are different atlases");
   if (auto comparable = checkCharts(a, *first, *second, context.quiet); !comparable) return comparable;
+  const auto kinds = commonKinds(a, *first, *second, context.quiet);
+  if (!kinds) return kinds.error();
   std::vector<Pair> pairs;
   for (std::size_t page = 0; page < pages; ++page) {
     const auto maskA = readMask(a.a / pageFileName(page, "aux"));
@@ -188,7 +205,7 @@ Expected<void> diffBakes(const DiffArguments& a, CommandContext& context) {
     const auto maskB = readMask(a.b / pageFileName(page, "aux"));
     if (!maskB) return maskB.error();
     const PixelMask both = [&](int x, int y) { return (*maskA)(x, y) && (*maskB)(x, y); };
-    for (const char* kind : {"rnm0", "rnm1", "rnm2", "flat"}) {
+    for (const std::string& kind : *kinds) {
       const std::string file = pageFileName(page, kind);
       auto pair = compareFiles(file, a.a / file, a.b / file, both);
       if (!pair) return pair.error();

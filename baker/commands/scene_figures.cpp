@@ -98,7 +98,7 @@ Json estimate(const Totals& totals, const BakeSize& scene, const EstimateOptions
   // covered ones at the borders of charts come on top.
   constexpr double kPacking = 0.82;
   constexpr double kTouched = 1.07;
-  constexpr double kBytesPerPageTexel = (3 * 3 + 3 + 4) * sizeof(float);  // what the five images hold
+  const double bytesPerPageTexel = (3 * (scene.maps + 1) + 4) * sizeof(float);  // what the images hold
   const double page = static_cast<double>(options.pageSize) * static_cast<double>(options.pageSize);
   const double area = totals.receivingArea;
   if (!(area > 0.0)) return nullptr;
@@ -112,7 +112,7 @@ Json estimate(const Totals& totals, const BakeSize& scene, const EstimateOptions
   return {{"texelsPerMeter", density},
           {"texels", std::llround(texels)},
           {"pages", std::llround(pages)},
-          {"imageBytes", std::llround(pages * page * kBytesPerPageTexel)},
+          {"imageBytes", std::llround(pages * page * bytesPerPageTexel)},
           {"bakeMemoryBytes", std::llround(bakeMemory(size))}};
 }
 

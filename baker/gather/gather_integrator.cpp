@@ -22,13 +22,13 @@ CacheLevels levelsFor(int bounces) {
 
 }  // namespace
 
-GatherIntegrator::GatherIntegrator(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
+GatherIntegrator::GatherIntegrator(const LightTransport& transport, const Encoding& encoding, const Atlas& atlas,
                                    const std::vector<PageTexels>& texels, const GatherOptions& options)
     : options_(options),
       map_(transport.rays, atlas, texels),
       waves_(texels),
       scene_{.transport = transport,
-             .kernels = kernels,
+             .encoding = encoding,
              .atlas = atlas,
              .texels = texels,
              .map = map_,
@@ -130,7 +130,7 @@ TexelLight GatherIntegrator::takeLight(GatherState& state) const {
     for (std::size_t t = first; t < last; ++t) {
       const float scale = 1.0f / state.weightOf(t);
       light.flat[t] *= scale;
-      for (std::vector<Vec3>& map : light.rnm) map[t] *= scale;
+      for (std::vector<Vec3>& map : light.maps) map[t] *= scale;
     }
   });
   return light;

@@ -62,7 +62,7 @@ class GatherIntegrator {
   static constexpr std::uint32_t kFirstPass = 8;
 
   /// Keeps references to its arguments.
-  GatherIntegrator(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
+  GatherIntegrator(const LightTransport& transport, const Encoding& encoding, const Atlas& atlas,
                    const std::vector<PageTexels>& texels, const GatherOptions& options);
 
   /// A gather that has not begun.

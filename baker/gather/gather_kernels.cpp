@@ -5,7 +5,6 @@
 
 #include "baker/gather/texel_map.h"
 #include "baker/rays/sampling.h"
-#include "lightmap/maps/rnm_basis.h"
 
 namespace lumel {
 namespace {
@@ -102,8 +101,8 @@ LUMEL_FOR_EACH_CPU void lookUpLight(const FoundTexels& found, const PackedColor*
   }
 }
 
-LUMEL_FOR_EACH_CPU bool addLight(const Vec3Lanes& dirTangent, const Vec3Lanes& kernels, const Vec3Lanes& light,
-                                 MapSums& sums) {
+LUMEL_FOR_EACH_CPU bool addLight(const Vec3Lanes& dirTangent, const KernelLanes& kernels, std::size_t maps,
+                                 const Vec3Lanes& light, MapSums& sums) {
   alignas(64) float red[kLanes], green[kLanes], blue[kLanes];
   int lost = 0;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
@@ -114,32 +113,18 @@ LUMEL_FOR_EACH_CPU bool addLight(const Vec3Lanes& dirTangent, const Vec3Lanes& k
     green[lane] = isNumber ? light.y[lane] : 0.0f;
     blue[lane] = isNumber ? light.z[lane] : 0.0f;
   }
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const float k[4] = {std::max(0.0f, dirTangent.z[lane]), kernels.x[lane], kernels.y[lane], kernels.z[lane]};
-    sums.sum[0][lane] += red[lane] * k[0];
-    sums.sum[1][lane] += green[lane] * k[0];
-    sums.sum[2][lane] += blue[lane] * k[0];
-    sums.sum[3][lane] += red[lane] * k[1];
-    sums.sum[4][lane] += green[lane] * k[1];
-    sums.sum[5][lane] += blue[lane] * k[1];
-    sums.sum[6][lane] += red[lane] * k[2];
-    sums.sum[7][lane] += green[lane] * k[2];
-    sums.sum[8][lane] += blue[lane] * k[2];
-    sums.sum[9][lane] += red[lane] * k[3];
-    sums.sum[10][lane] += green[lane] * k[3];
-    sums.sum[11][lane] += blue[lane] * k[3];
-  }
+  const auto addTo = [&](std::size_t map, const float* k) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      sums.sum[3 * map][lane] += red[lane] * k[lane];
+      sums.sum[3 * map + 1][lane] += green[lane] * k[lane];
+      sums.sum[3 * map + 2][lane] += blue[lane] * k[lane];
+    }
+  };
+  alignas(64) float flat[kLanes];
+  for (std::size_t lane = 0; lane < kLanes; ++lane) flat[lane] = std::max(0.0f, dirTangent.z[lane]);
+  addTo(0, flat);
+  for (std::size_t map = 0; map < maps; ++map) addTo(1 + map, kernels.of[map]);
   return lost != 0;
-}
-
-LUMEL_FOR_EACH_CPU void clampedDots(const Vec3Lanes& dirTangent, Vec3Lanes& kernels) {
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const Vec3 dir = dirTangent[lane];
-    const float above = dir.z > 0.0f ? 1.0f : 0.0f;
-    kernels.x[lane] = above * std::max(0.0f, glm::dot(dir, kRnmBasis[0]));
-    kernels.y[lane] = above * std::max(0.0f, glm::dot(dir, kRnmBasis[1]));
-    kernels.z[lane] = above * std::max(0.0f, glm::dot(dir, kRnmBasis[2]));
-  }
 }
 
 LUMEL_FOR_EACH_CPU void keepVisible(const ShadowPacket& shadows, float weight, Vec3Lanes& light) {
@@ -155,8 +140,8 @@ LUMEL_FOR_EACH_CPU void turnToTangent(const FrameLanes& frame, const Vec3Lanes& 
   for (std::size_t lane = 0; lane < kLanes; ++lane) dirTangent.set(lane, frame[lane].toLocal(dirWorld[lane]));
 }
 
-LUMEL_FOR_EACH_CPU void settle(MapSums& sums, MapTotals& totals) {
-  for (std::size_t map = 0; map < 12; ++map)
+LUMEL_FOR_EACH_CPU void settle(MapSums& sums, std::size_t maps, MapTotals& totals) {
+  for (std::size_t map = 0; map < 3 * (1 + maps); ++map)
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       totals.sum[map][lane] += static_cast<double>(sums.sum[map][lane]);
       sums.sum[map][lane] = 0.0f;

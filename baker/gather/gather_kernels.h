@@ -8,6 +8,7 @@
 #include "baker/gather/wave_points.h"
 #include "baker/rays/lanes.h"
 #include "baker/rays/stratified_net.h"
+#include "lightmap/maps/encoding.h"
 
 namespace lumel {
 
@@ -44,20 +45,19 @@ FoundTexels sortFound(const RayPacket& packet, const std::array<std::uint32_t, k
 void lookUpLight(const FoundTexels& found, const PackedColor* radiance, std::uint32_t stride, const float* weight,
                  Vec3Lanes& light);
 
-/// Sums of irradiance / pi over a few samples: of the flat map's three colours, then of those of the RNM maps.
+/// Sums of irradiance / pi over a few samples: of the flat map's three colours, then of those of an encoding's maps.
 struct alignas(64) MapSums {
-  float sum[12][kLanes] = {};
+  float sum[3 * (1 + kMostMaps)][kLanes] = {};
 };
 struct alignas(64) MapTotals {
-  double sum[12][kLanes] = {};
+  double sum[3 * (1 + kMostMaps)][kLanes] = {};
 };
+static_assert(kLanes == kKernelLanes);
 
-/// Adds light that arrives along dirTangent: times max(0, z) to the flat map, times the kernels to the others.
+/// Adds light that arrives along dirTangent: times max(0, z) to the flat map, times the kernels to the `maps` others.
 /// Light that is not finite is left out; returns whether there was any.
-bool addLight(const Vec3Lanes& dirTangent, const Vec3Lanes& kernels, const Vec3Lanes& light, MapSums& sums);
-
-/// RnmKernels::clampedDots for all lanes.
-void clampedDots(const Vec3Lanes& dirTangent, Vec3Lanes& kernels);
+bool addLight(const Vec3Lanes& dirTangent, const KernelLanes& kernels, std::size_t maps, const Vec3Lanes& light,
+              MapSums& sums);
 
 /// Light that nothing keeps away, times `weight`; the other lanes' becomes zero.
 void keepVisible(const ShadowPacket& shadows, float weight, Vec3Lanes& light);
@@ -65,7 +65,7 @@ void keepVisible(const ShadowPacket& shadows, float weight, Vec3Lanes& light);
 /// dirTangent = frame.toLocal(dirWorld).
 void turnToTangent(const FrameLanes& frame, const Vec3Lanes& dirWorld, Vec3Lanes& dirTangent);
 
-/// Moves the sums to the totals.
-void settle(MapSums& sums, MapTotals& totals);
+/// Moves the sums of the flat map and `maps` others to the totals.
+void settle(MapSums& sums, std::size_t maps, MapTotals& totals);
 
 }  // namespace lumel

@@ -24,7 +24,7 @@ float square(float x) { return x * x; }
 void store(const GatherScene& scene, GatherState& state, std::size_t index, const GatheredWave& gathered,
            std::uint32_t first, std::uint32_t end) {
   const Wave& wave = scene.waves[index];
-  std::array<float, 4>& moved = state.waves[index].moved;
+  std::array<float, 1 + kMostMaps>& moved = state.waves[index].moved;
   moved = {};
   std::array<float, kLanes> before{};
   std::array<float, kLanes> now{};
@@ -43,10 +43,10 @@ void store(const GatherScene& scene, GatherState& state, std::size_t index, cons
     if (!state.seen.empty()) state.seen[t] += Vec3(texel.seen);
     now[i] = luminance(flat) / static_cast<float>(end);
     moved[0] += square(now[i] - before[i]);
-    for (std::size_t k = 0; k < 3; ++k) {
-      Vec3& sum = state.sums.rnm[k][t];
+    for (std::size_t k = 0; k < state.sums.maps.size(); ++k) {
+      Vec3& sum = state.sums.maps[k][t];
       const float mean = luminance(sum) / static_cast<float>(std::max(1u, first));
-      sum += Vec3(texel.rnm[k]);
+      sum += Vec3(texel.maps[k]);
       moved[k + 1] += square(luminance(sum) / static_cast<float>(end) - mean);
     }
     if (!scene.levels.endless)

@@ -12,7 +12,7 @@
 #include "baker/gather/waves.h"
 #include "baker/light/direct_light.h"
 #include "baker/light/light_transport.h"
-#include "lightmap/maps/projection.h"
+#include "lightmap/maps/encoding.h"
 
 namespace lumel {
 
@@ -39,7 +39,7 @@ struct CacheLevels {
 /// What every wave reads, and what stays the same from pass to pass.
 struct GatherScene {
   const LightTransport& transport;
-  const RnmKernels& kernels;
+  const Encoding& encoding;
   const Atlas& atlas;
   const std::vector<PageTexels>& texels;
   const TexelMap& map;

@@ -22,7 +22,7 @@ namespace lumel {
 /// What the texels of a wave gathered in one pass: sums over its samples.
 struct GatheredTexel {
   Vec3d flat{0};
-  std::array<Vec3d, 3> rnm{Vec3d(0), Vec3d(0), Vec3d(0)};
+  std::array<Vec3d, kMostMaps> maps{};
   std::array<Vec3d, CacheLevels::kMost> levels{};  // flat light of the cache's levels, unless endless
   std::array<Vec3d, kProbeNormals> probes{};       // where the texel is probed
   Vec3d seen{0};  // with GatherScene::indirectOnly: flat light from what rays see shine by itself, not in the maps
@@ -46,6 +46,7 @@ struct GatherSink {
   std::uint32_t page;
   std::span<const TexelCoord> coords;
   std::size_t probedLane = kLanes;  // at most one texel of a wave is probed
+  std::size_t maps = scene.encoding.mapCount();
   MapSums sums{};
   MapTotals totals{};
   bool tallied = false;  // whether the gather rays are
@@ -73,22 +74,20 @@ struct GatherSink {
       result.texels[lane].probes[i] += Vec3d(light * std::max(0.0f, glm::dot(dirTangent, probeNormals()[i])));
   }
   void addToMaps(std::size_t lane, const Vec3& dirTangent, const Vec3& light) {
-    const Vec3 kernels = scene.kernels(dirTangent);
-    const std::array<float, 4> k = {std::max(0.0f, dirTangent.z), kernels.x, kernels.y, kernels.z};
-    for (std::size_t map = 0; map < 4; ++map)
+    const MapKernels kernels = scene.encoding.kernels(dirTangent);
+    for (std::size_t map = 0; map <= maps; ++map) {
+      const float k = map == 0 ? std::max(0.0f, dirTangent.z) : kernels[map - 1];
       for (int channel = 0; channel < 3; ++channel)
-        sums.sum[3 * map + static_cast<std::size_t>(channel)][lane] += light[channel] * k[map];
+        sums.sum[3 * map + static_cast<std::size_t>(channel)][lane] += light[channel] * k;
+    }
     if (lane == probedLane) addProbes(lane, dirTangent, light);
   }
   /// The same for all lanes; `sampleOf(lane)` names a sample that is not finite.
   template <class SampleOf>
   void addToMaps(const Vec3Lanes& dirTangent, const Vec3Lanes& light, SampleOf sampleOf) {
-    Vec3Lanes kernels;
-    if (scene.kernels.clampedDots())
-      clampedDots(dirTangent, kernels);
-    else
-      for (std::size_t lane = 0; lane < kLanes; ++lane) kernels.set(lane, scene.kernels(dirTangent[lane]));
-    if (addLight(dirTangent, kernels, light, sums))
+    KernelLanes kernels;
+    scene.encoding.laneKernels(dirTangent.x, dirTangent.y, dirTangent.z, kernels);
+    if (addLight(dirTangent, kernels, maps, light, sums))
       for (std::size_t lane = 0; lane < kLanes; ++lane)
         if (!isFinite(light[lane])) report(lane, sampleOf(lane));
     if (probedLane < kLanes && isFinite(light[probedLane]))

@@ -20,7 +20,7 @@ constexpr float kMostInside = 0.6f;
 
 constexpr std::string_view kMagic = "lumel gather state\n";
 /// Grows with every change of what is written.
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kBlock = std::size_t{1} << 20;
 
 /// FNV-1a (Fowler, Noll, Vo) over words of eight bytes, the last filled up with zeros.
@@ -71,7 +71,11 @@ void visitMembers(State& s, Visit visit) {
   visit(s.errors.credit);
   visit(s.errors.rate);
   visit(s.sums.flat);
-  for (auto& map : s.sums.rnm) visit(map);
+  auto mapCount = static_cast<std::uint32_t>(s.sums.maps.size());
+  visit(mapCount);
+  // A count that is damaged is found out by the checksum, and until then asks for little.
+  if constexpr (!std::is_const_v<State>) s.sums.maps.resize(std::min<std::size_t>(mapCount, kMostMaps));
+  for (auto& map : s.sums.maps) visit(map);
   visit(s.levelSums);
   visit(s.probes);
   visit(s.backFaces);
@@ -154,9 +158,10 @@ class Reader {
 
 }  // namespace
 
-void TexelLight::resize(std::size_t count) {
+void TexelLight::resize(std::size_t count, std::size_t mapCount) {
   flat.resize(count);
-  for (std::vector<Vec3>& map : rnm) map.resize(count);
+  maps.resize(mapCount);
+  for (std::vector<Vec3>& map : maps) map.resize(count);
 }
 
 GatherState::GatherState(const GatherScene& scene) : waves(scene.waves.size()), errors(scene.waves, kGatherCredit) {
@@ -175,7 +180,7 @@ GatherState::GatherState(const GatherScene& scene) : waves(scene.waves.size()), 
 
 void GatherState::makeSums(const GatherScene& scene) {
   const std::size_t count = scene.map.size();
-  sums.resize(count);
+  sums.resize(count, scene.encoding.mapCount());
   coverage.resize(count);
   inside.resize(count);
   if (!scene.levels.endless) levelSums.resize(count * scene.stored());
@@ -204,7 +209,8 @@ bool GatherState::fits(const GatherScene& scene) const {
              (has(warmBacks, count) || (warmBacks.empty() && samples > 0)) && has(reflectance, cached) &&
              has(direct, shining) && has(seen, shining) && has(sums.flat, summed) && has(coverage, summed) &&
              has(inside, summed) && has(probes, isWarm ? scene.waves.probes() : 0) && has(uneven, isWarm ? cached : 0);
-  for (const std::vector<Vec3>& map : sums.rnm) fit = fit && has(map, summed);
+  fit = fit && has(sums.maps, isWarm ? scene.encoding.mapCount() : 0);
+  for (const std::vector<Vec3>& map : sums.maps) fit = fit && has(map, summed);
   const std::size_t sources = scene.strategies.empty() ? 0 : scene.strategies.size() + 1;
   return fit && has(levelSums, scene.levels.endless ? 0 : summed * scene.stored()) &&
          has(spreads, isWarm ? scene.waves.size() * sources : 0) &&
@@ -252,7 +258,8 @@ std::uint64_t gatherKey(const GatherScene& scene, const GatherOptions& options) 
   key.addOne(options.targetError);
   key.addOne(static_cast<int>(options.adaptive));
   key.addOne(options.timeBudgetSeconds);
-  key.addOne(scene.kernels(Vec3(0.0f, 0.6f, 0.8f)));
+  key.add(scene.encoding.name().data(), scene.encoding.name().size());
+  key.addOne(scene.encoding.kernels(Vec3(0.0f, 0.6f, 0.8f)));
   key.addOne(scene.strategies.size());
   for (const PageTexels& page : scene.texels) {
     key.addOne(page.width);

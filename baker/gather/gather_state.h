@@ -35,9 +35,9 @@ struct GatherOptions {
 /// image is made.
 struct TexelLight {
   std::vector<Vec3> flat;
-  std::array<std::vector<Vec3>, 3> rnm;
+  std::vector<std::vector<Vec3>> maps;  // of the encoding
 
-  void resize(std::size_t count);
+  void resize(std::size_t count, std::size_t mapCount);
 };
 
 struct GatherState {
@@ -45,7 +45,7 @@ struct GatherState {
     std::uint32_t samples = 0;  // it has taken [0, samples) of each of its texels
     std::uint32_t done = 0;     // 1: as good as its goal
     // For the flat map and the others: sum over texels of the square of how far their means moved in the last pass.
-    std::array<float, 4> moved{};
+    std::array<float, 1 + kMostMaps> moved{};
   };
   struct NonFiniteOfWave {
     std::uint32_t wave = 0;

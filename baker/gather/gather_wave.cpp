@@ -110,7 +110,7 @@ void GatherWave::sampleStrategy(std::size_t strategy, std::uint32_t first, std::
       if (sampled.found(lane) && isFinite(sampled.light[lane]))
         sink.addToLevels(lane, dirTangent[lane], sampled.light[lane], 0);
   }
-  settle(sink.sums, sink.totals);
+  settle(sink.sums, sink.maps, sink.totals);
 }
 
 void GatherWave::gatherRays(const NetRange& net, GatherTracer<GatherSink>& tracer, GatherSink& sink) {
@@ -129,7 +129,7 @@ void GatherWave::gatherRays(const NetRange& net, GatherTracer<GatherSink>& trace
       collect(packet(3), tracer, sink);
       tracer.advance();
       // Sums of a few samples lose nothing as floats.
-      if ((packet(3).cell & 15u) == 15u) settle(sink.sums, sink.totals);
+      if ((packet(3).cell & 15u) == 15u) settle(sink.sums, sink.maps, sink.totals);
     }
     if (inFlight(2)) wave_.scene.map.findTexels(packet(2).lookup);
     if (inFlight(1)) wave_.scene.map.findPixels(packet(1).rays.packet, packet(1).lookup);
@@ -138,7 +138,7 @@ void GatherWave::gatherRays(const NetRange& net, GatherTracer<GatherSink>& trace
     if (inFlight(2)) expectLight(packet(2), tracer, sink);
   }
   sink.judgePoints(net);
-  settle(sink.sums, sink.totals);
+  settle(sink.sums, sink.maps, sink.totals);
 }
 
 /// The footprint point of the rays into a cell: any 16 neighbouring cells use all points of a texel, and where a point

@@ -22,7 +22,7 @@ constexpr double kSettledFloor = 1e-3;
 
 /// How much larger the worst map's error is than the flat one's, around a wave, by how far both moved.
 double worstByFlat(const Waves& waves, const GatherState& state, std::size_t wave) {
-  std::array<double, 4> moved{};
+  std::array<double, 1 + kMostMaps> moved{};
   for (const std::uint32_t near : waves.around(wave))
     if (near != Waves::kNone)
       for (std::size_t map = 0; map < moved.size(); ++map)

@@ -33,8 +33,8 @@ struct Path {
 
 class WaveTracer {
  public:
-  WaveTracer(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas, const PathOptions& options)
-      : transport_(transport), kernels_(kernels), atlas_(atlas), options_(options) {}
+  WaveTracer(const LightTransport& transport, const Encoding& encoding, const Atlas& atlas, const PathOptions& options)
+      : transport_(transport), encoding_(encoding), atlas_(atlas), options_(options) {}
 
   WaveResult run(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count);
 
@@ -55,7 +55,7 @@ class WaveTracer {
   bool leavesOut(int depth) const { return depth == 0 && options_.indirectOnly; }
 
   const LightTransport& transport_;
-  const RnmKernels& kernels_;
+  const Encoding& encoding_;
   const Atlas& atlas_;
   const PathOptions& options_;
 
@@ -162,9 +162,9 @@ void WaveTracer::addLight(int lane, const Vec3& dirTangent, const Vec3& radiance
   const auto l = static_cast<std::size_t>(lane);
   Path& path = paths_[l];
   const Vec3 light = radianceOverPdf * kInvPi;
-  const Vec3 kernels = kernels_(dirTangent);
+  const MapKernels kernels = encoding_.kernels(dirTangent);
   path.value.flat += light * std::max(0.0f, dirTangent.z);
-  for (int i = 0; i < 3; ++i) path.value.rnm[static_cast<std::size_t>(i)] += light * kernels[i];
+  for (std::size_t i = 0; i < encoding_.mapCount(); ++i) path.value.maps[i] += light * kernels[i];
   if (result_.texels[l].probed)
     for (std::size_t i = 0; i < kProbeNormals; ++i)
       path.probes[i] += light * std::max(0.0f, glm::dot(dirTangent, probeNormals()[i]));
@@ -262,24 +262,27 @@ bool WaveTracer::scatter(int depth) {
   return any;
 }
 
-bool allFinite(const SampleValue& value) {
-  return isFinite(value.flat) && isFinite(value.rnm[0]) && isFinite(value.rnm[1]) && isFinite(value.rnm[2]);
+bool allFinite(const SampleValue& value, std::size_t maps) {
+  return isFinite(value.flat) && std::all_of(value.maps.begin(), value.maps.begin() + static_cast<std::ptrdiff_t>(maps),
+                                             [](const Vec3& map) { return isFinite(map); });
 }
 
 void WaveTracer::finishSample() {
+  const std::size_t maps = encoding_.mapCount();
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (!covered_[lane]) continue;
     Path& path = paths_[lane];
     if (path.radiance != Vec3(0.0f))
       addLight(static_cast<int>(lane), path.gatherTangent, path.radiance / path.gatherPdf);
     const std::uint32_t sample = samples_.sample(static_cast<int>(lane));
-    if (!allFinite(path.value)) {
+    if (!allFinite(path.value, maps)) {
       result_.nonFinite.push_back({page_, coords_[lane], sample});
       continue;
     }
     TexelResult& texel = result_.texels[lane];
-    texel.sums.add(path.value, static_cast<int>(std::uint64_t{sample} * TexelSums::kBatches /
-                                                static_cast<std::uint64_t>(options_.samples)));
+    texel.sums.add(
+        path.value, maps,
+        static_cast<int>(std::uint64_t{sample} * TexelSums::kBatches / static_cast<std::uint64_t>(options_.samples)));
     if (texel.probed)
       for (std::size_t i = 0; i < kProbeNormals; ++i) texel.probes[i] += path.probes[i];
   }
@@ -287,15 +290,15 @@ void WaveTracer::finishSample() {
 
 }  // namespace
 
-PathIntegrator::PathIntegrator(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
+PathIntegrator::PathIntegrator(const LightTransport& transport, const Encoding& encoding, const Atlas& atlas,
                                const PathOptions& options)
-    : transport_(transport), kernels_(kernels), atlas_(atlas), options_(options) {
+    : transport_(transport), encoding_(encoding), atlas_(atlas), options_(options) {
   if (options_.bounces < 0) options_.bounces = kLongestPath;
 }
 
 WaveResult PathIntegrator::bakeWave(std::uint32_t pageIndex, const PageTexels& page, std::size_t first,
                                     std::size_t count) const {
-  WaveTracer tracer(transport_, kernels_, atlas_, options_);
+  WaveTracer tracer(transport_, encoding_, atlas_, options_);
   return tracer.run(pageIndex, page, first, count);
 }
 

@@ -9,7 +9,7 @@
 #include "baker/light/light_transport.h"
 #include "baker/path/texel_sums.h"
 #include "baker/rays/non_finite.h"
-#include "lightmap/maps/projection.h"
+#include "lightmap/maps/encoding.h"
 #include "lightmap/maps/projection_probe.h"
 #include "lightmap/surface.h"
 #include "lightmap/texels/texels.h"
@@ -42,7 +42,7 @@ struct WaveResult {
 class PathIntegrator {
  public:
   /// Keeps references to all of its arguments.
-  PathIntegrator(const LightTransport& transport, const RnmKernels& kernels, const Atlas& atlas,
+  PathIntegrator(const LightTransport& transport, const Encoding& encoding, const Atlas& atlas,
                  const PathOptions& options);
 
   /// Samples texels [first, first + count) of `page`, count <= kLanes. Every kProbeStride-th texel of the page is
@@ -51,7 +51,7 @@ class PathIntegrator {
 
  private:
   const LightTransport& transport_;
-  const RnmKernels& kernels_;
+  const Encoding& encoding_;
   const Atlas& atlas_;
   PathOptions options_;
 };

@@ -7,7 +7,7 @@ SampleValue TexelSums::mean() const {
   if (count_ == 0) return value;
   const double scale = 1.0 / count_;
   value.flat = Vec3(flat_ * scale);
-  for (std::size_t i = 0; i < 3; ++i) value.rnm[i] = Vec3(rnm_[i] * scale);
+  for (std::size_t i = 0; i < kMostMaps; ++i) value.maps[i] = Vec3(maps_[i] * scale);
   return value;
 }
 

@@ -4,14 +4,15 @@
 #include <array>
 #include <cstdint>
 
+#include "lightmap/maps/encoding.h"
 #include "scene/base/math.h"
 
 namespace lumel {
 
-/// Holds the light of one sample, spread over the maps: each an estimate of irradiance / pi.
+/// Holds the light of one sample, spread over the flat map and those of an encoding: estimates of irradiance / pi.
 struct SampleValue {
   Vec3 flat{0};
-  std::array<Vec3, 3> rnm{Vec3(0), Vec3(0), Vec3(0)};
+  std::array<Vec3, kMostMaps> maps{};
 };
 
 /// Adds up the samples of one texel.
@@ -19,10 +20,11 @@ class TexelSums {
  public:
   static constexpr int kBatches = 16;
 
-  /// `batch` in [0, kBatches) says which stretch of the sample sequence the sample belongs to.
-  void add(const SampleValue& value, int batch) {
+  /// `maps` says how many there are, `batch` in [0, kBatches) which stretch of the sample sequence the sample belongs
+  /// to.
+  void add(const SampleValue& value, std::size_t maps, int batch) {
     flat_ += value.flat;
-    for (std::size_t i = 0; i < 3; ++i) rnm_[i] += value.rnm[i];
+    for (std::size_t i = 0; i < maps; ++i) maps_[i] += value.maps[i];
     const auto b = static_cast<std::size_t>(batch);
     batchSum_[b] += static_cast<double>(luminance(value.flat));
     ++batchCount_[b];
@@ -43,7 +45,7 @@ class TexelSums {
 
  private:
   Vec3d flat_{0};
-  std::array<Vec3d, 3> rnm_{Vec3d(0), Vec3d(0), Vec3d(0)};
+  std::array<Vec3d, kMostMaps> maps_{};
   std::array<double, kBatches> batchSum_{};
   std::array<std::uint32_t, kBatches> batchCount_{};
   std::uint32_t count_ = 0;

@@ -4,7 +4,6 @@
 #include <map>
 #include <optional>
 
-#include "lightmap/maps/projection.h"
 #include "scene/base/embree.h"
 #include "scene/base/parallel.h"
 #include "scene/images/environment.h"
@@ -313,9 +312,11 @@ Vec3 Compositor::Impl::worldNormal(const Hit& hit) const {
 Vec3 Compositor::Impl::light(const Hit& hit) const {
   const int page = hit.shape->primitive->lightmapPage;
   if (page < 0) return baked.meanFlat;
-  const std::array<Image, 3>& maps = baked.pages[toSize(page)];
+  const std::vector<Image>& maps = baked.pages[toSize(page)];
   const Bilinear lookup(maps[0], uvAt(hit, 1));
-  return decodeRnm({lookup(maps[0]), lookup(maps[1]), lookup(maps[2])}, tangentNormal(hit), baked.decode);
+  std::array<Vec3, kMostMaps> values;
+  std::transform(maps.begin(), maps.end(), values.begin(), lookup);
+  return baked.encoding->decode(std::span(values).first(maps.size()), tangentNormal(hit));
 }
 
 Vec3 Compositor::Impl::shade(const Hit& hit, const Vec4& base, RenderMode mode) const {

@@ -118,7 +118,7 @@ class Studying {
             .samples = point.samples,
             .bounces = options_.bounces,
             .seed = options_.seed,
-            .projection = point.projection};
+            .encoding = rnmEncoding(point.projection)};
   }
 
   const Scene& scene_;
@@ -194,7 +194,9 @@ Expected<void> Studying::makeReference() {
   }
   // Half of the difference of two independent halves has the variance of their mean.
   flatNoise_ = differenceOf(halves[0].flat, halves[1].flat).square / 4.0;
-  for (std::size_t k = 0; k < 3; ++k) rnmNoise_ += differenceOf(halves[0].rnm[k], halves[1].rnm[k]).square / 12.0;
+  const std::size_t mapCount = halves[0].maps.size();
+  for (std::size_t k = 0; k < mapCount; ++k)
+    rnmNoise_ += differenceOf(halves[0].maps[k], halves[1].maps[k]).square / (4.0 * static_cast<double>(mapCount));
   truth_ = std::move(halves[0]);
   const auto average = [](std::vector<Vec3>& a, const std::vector<Vec3>& b) {
     for (std::size_t i = 0; i < a.size(); ++i) a[i] = 0.5f * (a[i] + b[i]);
@@ -202,12 +204,13 @@ Expected<void> Studying::makeReference() {
   average(truth_.flat, halves[1].flat);
   for (std::size_t i = 0; i < truth_.standardError.size(); ++i)
     truth_.standardError[i] = 0.5f * std::hypot(truth_.standardError[i], halves[1].standardError[i]);
-  for (std::size_t k = 0; k < 3; ++k) average(truth_.rnm[k], halves[1].rnm[k]);
+  for (std::size_t k = 0; k < mapCount; ++k) average(truth_.maps[k], halves[1].maps[k]);
   reference.meanFlat = meanOf(truth_.flat);
   if (!(reference.meanFlat > 0.0))
     return inputError("nothing in the scene is lit, so there is no error to study; give --sky-color or --sky");
   reference.flatError = std::sqrt(flatNoise_) / reference.meanFlat;
-  const double rnmMean = (meanOf(truth_.rnm[0]) + meanOf(truth_.rnm[1]) + meanOf(truth_.rnm[2])) / 3.0;
+  double rnmMean = 0.0;
+  for (const std::vector<Vec3>& map : truth_.maps) rnmMean += meanOf(map) / static_cast<double>(mapCount);
   reference.rnmError = std::sqrt(rnmNoise_) / rnmMean;
   return {};
 }
@@ -248,11 +251,12 @@ void Studying::compare(const std::vector<BakedPage>& pages, StudyPoint& point) c
   point.flat = errorOf(flat.square, flatNoise_, flat.mean, mean);
   MapDifference rnm;
   double rnmMean = 0.0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const MapDifference d = differenceOf(maps.rnm[k], truth_.rnm[k]);
-    rnm.square += d.square / 3.0;
-    rnm.mean += d.mean / 3.0;
-    rnmMean += meanOf(truth_.rnm[k]) / 3.0;
+  const auto mapCount = static_cast<double>(maps.maps.size());
+  for (std::size_t k = 0; k < maps.maps.size(); ++k) {
+    const MapDifference d = differenceOf(maps.maps[k], truth_.maps[k]);
+    rnm.square += d.square / mapCount;
+    rnm.mean += d.mean / mapCount;
+    rnmMean += meanOf(truth_.maps[k]) / mapCount;
   }
   point.rnm = errorOf(rnm.square, rnmNoise_, rnm.mean, rnmMean);
   std::size_t lit = 0;

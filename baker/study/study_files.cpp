@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "baker/files/names/conventions.h"
 #include "baker/files/names/version.h"
 #include "baker/study/plot.h"
 #include "scene/files/file_set.h"

@@ -17,6 +17,7 @@ StudyMask validTexels(const std::vector<BakedPage>& pages) {
 
 StudyMaps mapsOf(const std::vector<BakedPage>& pages, const StudyMask& mask) {
   StudyMaps maps;
+  if (!pages.empty()) maps.maps.resize(pages[0].maps.size());
   for (std::size_t p = 0; p < pages.size(); ++p)
     for (std::size_t i = 0; i < mask[p].size(); ++i) {
       if (!mask[p][i]) continue;
@@ -24,7 +25,7 @@ StudyMaps mapsOf(const std::vector<BakedPage>& pages, const StudyMask& mask) {
         return Vec3(image.pixels[3 * i], image.pixels[3 * i + 1], image.pixels[3 * i + 2]);
       };
       maps.flat.push_back(pixel(pages[p].flat));
-      for (std::size_t k = 0; k < 3; ++k) maps.rnm[k].push_back(pixel(pages[p].rnm[k]));
+      for (std::size_t k = 0; k < maps.maps.size(); ++k) maps.maps[k].push_back(pixel(pages[p].maps[k]));
       maps.standardError.push_back(pages[p].aux.pixels[4 * i + 2]);
     }
   return maps;

@@ -1,7 +1,6 @@
 // The maps of a study's bakes, texel by texel, and how far they are apart.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -15,7 +14,7 @@ using StudyMask = std::vector<std::vector<std::uint8_t>>;
 /// The values of all texels that count, page by page and row by row.
 struct StudyMaps {
   std::vector<Vec3> flat;
-  std::array<std::vector<Vec3>, 3> rnm;
+  std::vector<std::vector<Vec3>> maps;  // of the encoding
   std::vector<float> standardError;
 };
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "lightmap/maps/encoding.h"
 #include "scene/base/check.h"
 #include "scene/base/each_cpu.h"
 #include "scene/base/parallel.h"
@@ -12,8 +13,6 @@
 namespace lumel {
 namespace {
 
-constexpr std::size_t kMaps = 4;
-constexpr std::size_t kColors = 3 * kMaps;
 constexpr int kPatch = 1;        // patches of 3 x 3 texels are compared
 constexpr int kNoiseWindow = 2;  // noise is measured over 5 x 5 texels
 /// Texels of a tile's margin: what the comparisons of its texels look at.
@@ -33,11 +32,11 @@ constexpr Pass kFar{2, 4};  // what is left of the noise after kNear is blotches
 static_assert(kNear.radius * kNear.step + kPatch + kNoiseWindow + 1 <= kHalo);
 static_assert(kFar.radius * kFar.step + kPatch <= kHalo);
 
-/// Variance of the luminance of an RNM map over that of the flat map where there is nothing to measure it by, and what
-/// is believed of measurements: tilted maps see less evenly than the flat one.
-constexpr float kRnmVariance = 2.0f;
-constexpr float kLeastRnmVariance = 1.5f;
-constexpr float kMostRnmVariance = 8.0f;
+/// Variance of the luminance of an encoding's map over that of the flat map where there is nothing to measure it by,
+/// and what is believed of measurements: tilted maps see less evenly than the flat one.
+constexpr float kMapVariance = 2.0f;
+constexpr float kLeastMapVariance = 1.5f;
+constexpr float kMostMapVariance = 8.0f;
 /// Stated variances may be too large, by so much at few samples.
 constexpr float kLeastOfStated = 0.5f;
 /// The variance of what kNear leaves is more than that of independent texels with its weights, which depend on them.
@@ -57,12 +56,14 @@ struct Tile {
   std::size_t columns = 0;
   std::size_t stride = 0;
   std::vector<std::uint32_t> charts;
-  std::vector<float> variance;                  // of the flat map's luminance
-  std::array<std::vector<float>, 3> flatByRnm;  // that over the variance of an RNM map
+  std::vector<float> variance;                // of the flat map's luminance
+  std::vector<std::vector<float>> flatByMap;  // that over the variance of each of the encoding's maps
   std::array<std::vector<float>, 3> normals;
-  std::array<std::vector<float>, kMaps> luminances;
-  std::array<std::vector<float>, kColors> colors;
+  // Of all maps, the flat one first.
+  std::vector<std::vector<float>> luminances;
+  std::vector<std::vector<float>> colors;
 
+  std::size_t maps() const { return luminances.size(); }
   std::size_t at(std::ptrdiff_t row, std::ptrdiff_t x) const {
     return static_cast<std::size_t>((row + kHalo) * static_cast<std::ptrdiff_t>(stride) + x + kHalo);
   }
@@ -71,8 +72,8 @@ struct Tile {
 /// The rows of the maps as they were: those above `firstKept` + kHalo have changed, of the last of them `kept` holds
 /// copies.
 struct Rows {
-  std::array<Image*, kMaps> maps;
-  std::array<std::vector<float>, kMaps> kept;  // kHalo rows
+  std::span<Image* const> maps;
+  std::vector<std::vector<float>> kept;  // kHalo rows
   std::ptrdiff_t firstKept = -kHalo;
 
   std::size_t rowSize() const { return static_cast<std::size_t>(maps[0]->width) * 3; }
@@ -83,7 +84,8 @@ struct Rows {
   /// Before rows up to `last`, all of them after those that are kept, change. They must be at least kHalo.
   void keepBefore(std::ptrdiff_t last) {
     firstKept = last - kHalo;
-    for (std::size_t m = 0; m < kMaps; ++m) {
+    kept.resize(maps.size());
+    for (std::size_t m = 0; m < maps.size(); ++m) {
       const float* from = maps[m]->pixels.data() + static_cast<std::size_t>(firstKept) * rowSize();
       kept[m].assign(from, from + kHalo * rowSize());
     }
@@ -110,17 +112,18 @@ Tile readTile(const Rows& from, const Judged& judged, std::ptrdiff_t firstRow, s
   const std::size_t count = tile.stride * (rows + 2 * kHalo);
   tile.charts.assign(count, 0);
   tile.variance.assign(count, std::numeric_limits<float>::min());
-  for (auto& plane : tile.flatByRnm) plane.assign(count, 1.0f / kRnmVariance);
+  const std::size_t maps = from.maps.size();
+  tile.flatByMap.assign(maps - 1, std::vector<float>(count, 1.0f / kMapVariance));
   for (auto& plane : tile.normals) plane.assign(count, 0.0f);
-  for (auto& plane : tile.luminances) plane.assign(count, 0.0f);
-  for (auto& plane : tile.colors) plane.assign(count, 0.0f);
+  tile.luminances.assign(maps, std::vector<float>(count, 0.0f));
+  tile.colors.assign(3 * maps, std::vector<float>(count, 0.0f));
   const std::ptrdiff_t left = std::max<std::ptrdiff_t>(0, firstColumn - kHalo);
   const std::ptrdiff_t right = std::min(width, firstColumn + static_cast<std::ptrdiff_t>(columns) + kHalo);
   for (std::ptrdiff_t row = -kHalo; row < static_cast<std::ptrdiff_t>(rows) + kHalo; ++row) {
     const std::ptrdiff_t y = firstRow + row;
     if (y < 0 || y >= height) continue;
-    std::array<const float*, kMaps> pixels{};
-    for (std::size_t m = 0; m < kMaps; ++m) pixels[m] = from.row(m, y);
+    std::array<const float*, 1 + kMostMaps> pixels{};
+    for (std::size_t m = 0; m < maps; ++m) pixels[m] = from.row(m, y);
     for (std::ptrdiff_t x = left; x < right; ++x) {
       const auto source = static_cast<std::size_t>(y * width + x);
       if (judged.chartIds[source] == 0) continue;
@@ -128,7 +131,7 @@ Tile readTile(const Rows& from, const Judged& judged, std::ptrdiff_t firstRow, s
       tile.charts[to] = judged.chartIds[source];
       for (std::size_t c = 0; c < 3; ++c)
         tile.normals[c][to] = static_cast<float>(judged.normals[source][c]) / kCoarseNormal;
-      for (std::size_t m = 0; m < kMaps; ++m) {
+      for (std::size_t m = 0; m < maps; ++m) {
         const float* pixel = pixels[m] + x * 3;
         for (std::size_t c = 0; c < 3; ++c) tile.colors[m * 3 + c][to] = pixel[c];
         tile.luminances[m][to] = luminance(Vec3(pixel[0], pixel[1], pixel[2]));
@@ -155,13 +158,12 @@ void sumWindows(std::vector<float>& plane, std::size_t step, std::vector<float>&
 /// map's stated variance is the most; to the other maps it adds in proportion, and their ratios to the flat one hold.
 LUMEL_FOR_EACH_CPU void measureNoise(Tile& tile) {
   const std::size_t count = tile.charts.size();
-  std::array<std::vector<float>, kMaps> squares;
-  for (auto& plane : squares) plane.assign(count, 0.0f);
+  std::vector<std::vector<float>> squares(tile.maps(), std::vector<float>(count, 0.0f));
   std::vector<float> terms(count, 0.0f);
   std::vector<float> scratch;
   const std::uint32_t* chart = tile.charts.data();
   for (const std::size_t step : {std::size_t{1}, tile.stride})
-    for (std::size_t m = 0; m < kMaps; ++m) {
+    for (std::size_t m = 0; m < tile.maps(); ++m) {
       const float* light = tile.luminances[m].data();
       float* sum = squares[m].data();
       for (std::size_t i = step; i + step < count; ++i) {
@@ -171,18 +173,20 @@ LUMEL_FOR_EACH_CPU void measureNoise(Tile& tile) {
         if (m == 0) terms[i] += inside ? 1.5f : 0.0f;
       }
     }
-  for (auto* plane : {&squares[0], &squares[1], &squares[2], &squares[3], &terms}) {
-    sumWindows(*plane, 1, scratch);
-    sumWindows(*plane, tile.stride, scratch);
-  }
+  const auto sumAround = [&](std::vector<float>& plane) {
+    sumWindows(plane, 1, scratch);
+    sumWindows(plane, tile.stride, scratch);
+  };
+  for (auto& plane : squares) sumAround(plane);
+  sumAround(terms);
   for (std::size_t i = 0; i < count; ++i) {
     const bool measured = squares[0][i] > 0.0f;
     const float flat = squares[0][i];
     const float stated = tile.variance[i];
     tile.variance[i] = measured ? std::max(kLeastOfStated * stated, std::min(flat / terms[i], stated)) : stated;
-    for (std::size_t m = 0; m < 3; ++m) {
-      const float ratio = std::max(flat / squares[m + 1][i], 1.0f / kMostRnmVariance);
-      tile.flatByRnm[m][i] = measured ? std::min(ratio, 1.0f / kLeastRnmVariance) : 1.0f / kRnmVariance;
+    for (std::size_t m = 0; m + 1 < tile.maps(); ++m) {
+      const float ratio = std::max(flat / squares[m + 1][i], 1.0f / kMostMapVariance);
+      tile.flatByMap[m][i] = measured ? std::min(ratio, 1.0f / kLeastMapVariance) : 1.0f / kMapVariance;
     }
   }
 }
@@ -193,33 +197,65 @@ struct Differences {
   std::vector<float> comparable;
 };
 
-/// Squared difference of texels `shift` apart, less what their noise explains, relative to that noise; the mean over
-/// the four maps. Each entry is the sum over a row of the patch. `first`: the tile's entry of the first of `width`.
+/// Squared differences of `count` texels from `first` on and those `shift` from them, less what their noise explains,
+/// relative to that noise; the mean over the flat map and `Maps` others.
+template <std::size_t Maps>
+[[gnu::always_inline]] inline void distancesOf(const Tile& tile, std::size_t first, std::ptrdiff_t shift,
+                                               std::size_t count, float* distance) {
+  const float* variance = tile.variance.data() + first;
+  const float* flat = tile.luminances[0].data() + first;
+  std::array<const float*, Maps> light{}, trust{};
+  for (std::size_t m = 0; m < Maps; ++m) {
+    light[m] = tile.luminances[m + 1].data() + first;
+    trust[m] = tile.flatByMap[m].data() + first;
+  }
+#pragma GCC ivdep
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto i = static_cast<std::ptrdiff_t>(k);
+    const float noise = variance[i] + variance[i + shift];
+    const float ofFlat = flat[i] - flat[i + shift];
+    float others = 0.0f;
+    for (std::size_t m = 0; m < Maps; ++m) {
+      const float difference = light[m][i] - light[m][i + shift];
+      others += difference * difference * (trust[m][i] + trust[m][i + shift]);
+    }
+    const float squares = ofFlat * ofFlat + 0.5f * others;
+    distance[k] = squares / (static_cast<float>(1 + Maps) * noise) - 1.0f;
+  }
+}
+
+/// The same for as many maps as the tile has: with their number known the loop over texels becomes vector code.
+[[gnu::always_inline]] inline void distancesOf(const Tile& tile, std::size_t first, std::ptrdiff_t shift,
+                                               std::size_t count, float* distance) {
+  static_assert(kMostMaps == 6);
+  switch (tile.maps() - 1) {
+    case 1:
+      return distancesOf<1>(tile, first, shift, count, distance);
+    case 2:
+      return distancesOf<2>(tile, first, shift, count, distance);
+    case 3:
+      return distancesOf<3>(tile, first, shift, count, distance);
+    case 4:
+      return distancesOf<4>(tile, first, shift, count, distance);
+    case 5:
+      return distancesOf<5>(tile, first, shift, count, distance);
+    case 6:
+      return distancesOf<6>(tile, first, shift, count, distance);
+    default:
+      LUMEL_CHECK(false);
+  }
+}
+
+/// Distances of a row's texels, summed along it. Each entry is the sum over a row of the patch. `first`: the tile's
+/// entry of the first of `width`.
 void differencesOfRow(const Tile& tile, std::size_t first, std::ptrdiff_t shift, std::size_t width, Differences& raw,
                       Differences& out) {
   first -= kPatch;
   const std::size_t count = width + 2 * kPatch;
   const std::uint32_t* chart = tile.charts.data() + first;
-  const float* variance = tile.variance.data() + first;
-  std::array<const float*, kMaps> light{};
-  for (std::size_t m = 0; m < kMaps; ++m) light[m] = tile.luminances[m].data() + first;
-  std::array<const float*, 3> trust{};
-  for (std::size_t m = 0; m < 3; ++m) trust[m] = tile.flatByRnm[m].data() + first;
   float* distance = raw.distance.data();
   float* comparable = raw.comparable.data();
-#pragma GCC ivdep
-  for (std::size_t k = 0; k < count; ++k) {
-    const auto i = static_cast<std::ptrdiff_t>(k);
-    const float noise = variance[i] + variance[i + shift];
-    const float d0 = light[0][i] - light[0][i + shift];
-    const float d1 = light[1][i] - light[1][i + shift];
-    const float d2 = light[2][i] - light[2][i + shift];
-    const float d3 = light[3][i] - light[3][i + shift];
-    const float squares = d0 * d0 + 0.5f * (d1 * d1 * (trust[0][i] + trust[0][i + shift]) +
-                                            d2 * d2 * (trust[1][i] + trust[1][i + shift]) +
-                                            d3 * d3 * (trust[2][i] + trust[2][i + shift]));
-    distance[k] = squares / (static_cast<float>(kMaps) * noise) - 1.0f;
-  }
+  distancesOf(tile, first, shift, count, distance);
   // A loop of its own: as a choice in the one above, compilers would branch around the division.
   for (std::size_t k = 0; k < count; ++k) {
     const auto i = static_cast<std::ptrdiff_t>(k);
@@ -287,7 +323,7 @@ Agreements::Agreements(const Tile& tile, int dx, int dy)
 struct Sums {
   std::vector<float> weight;
   std::vector<float> squaredWeight;
-  std::array<std::vector<float>, kColors> colors;
+  std::vector<std::vector<float>> colors;
 };
 
 /// Adds to every texel of the tile the two that lie (dx, dy) and (-dx, -dy) from it, dy >= 0, as far as the patches of
@@ -313,7 +349,7 @@ LUMEL_FOR_EACH_CPU void addPair(const Tile& tile, int dx, int dy, Sums& sums) {
       sums.squaredWeight[to + x] += aheads[x] * aheads[x] + behinds[x] * behinds[x];
     }
     const auto here = static_cast<std::ptrdiff_t>(tile.at(static_cast<std::ptrdiff_t>(row), 0));
-    for (std::size_t c = 0; c < kColors; ++c) {
+    for (std::size_t c = 0; c < tile.colors.size(); ++c) {
       const float* from = tile.colors[c].data() + here;
       float* sum = sums.colors[c].data() + to;
       for (std::size_t k = 0; k < width; ++k) {
@@ -331,13 +367,13 @@ Sums averageTile(const Tile& tile, const Pass& pass) {
   const std::size_t width = tile.columns;
   const std::size_t count = width * tile.rows;
   sums.weight.assign(count, 0.0f);
-  for (auto& plane : sums.colors) plane.assign(count, 0.0f);
+  sums.colors.assign(tile.colors.size(), std::vector<float>(count, 0.0f));
   for (std::size_t row = 0; row < tile.rows; ++row) {
     const std::size_t here = tile.at(static_cast<std::ptrdiff_t>(row), 0);
     for (std::size_t x = 0; x < width; ++x) {
       if (tile.charts[here + x] == 0) continue;
       sums.weight[row * width + x] = 1.0f;
-      for (std::size_t c = 0; c < kColors; ++c) sums.colors[c][row * width + x] = tile.colors[c][here + x];
+      for (std::size_t c = 0; c < tile.colors.size(); ++c) sums.colors[c][row * width + x] = tile.colors[c][here + x];
     }
   }
   sums.squaredWeight = sums.weight;
@@ -351,7 +387,7 @@ Sums averageTile(const Tile& tile, const Pass& pass) {
 struct Averages {
   std::size_t width;
   std::size_t firstRow;  // of the strip
-  std::array<std::vector<float>, kMaps> strip;
+  std::vector<std::vector<float>> strip;
   std::span<float> remaining;
 };
 
@@ -363,7 +399,8 @@ void storeTile(const Tile& tile, const Sums& sums, std::size_t row, std::size_t 
       if (!(sums.weight[i] > 0.0f)) continue;
       const std::size_t texel = (row + y) * to.width + column + x;
       const std::size_t pixel = 3 * (texel - to.firstRow * to.width);
-      for (std::size_t c = 0; c < kColors; ++c) to.strip[c / 3][pixel + c % 3] = sums.colors[c][i] / sums.weight[i];
+      for (std::size_t c = 0; c < sums.colors.size(); ++c)
+        to.strip[c / 3][pixel + c % 3] = sums.colors[c][i] / sums.weight[i];
       if (!to.remaining.empty())
         to.remaining[texel] =
             std::min(kRemainingVariance * sums.squaredWeight[i] / (sums.weight[i] * sums.weight[i]), 1.0f);
@@ -371,17 +408,16 @@ void storeTile(const Tile& tile, const Sums& sums, std::size_t row, std::size_t 
 }
 
 /// Averages the texels of a page. `remaining`: one entry per texel, or empty.
-void averagePage(const std::array<Image*, kMaps>& maps, const Judged& judged, const Pass& pass,
-                 std::span<float> remaining) {
+void averagePage(std::span<Image* const> maps, const Judged& judged, const Pass& pass, std::span<float> remaining) {
   const auto width = static_cast<std::size_t>(maps[0]->width);
   const auto height = static_cast<std::size_t>(maps[0]->height);
   const std::size_t tilesPerRow = (width + kTileColumns - 1) / kTileColumns;
   Rows before{maps, {}};
-  Averages to{width, 0, {}, remaining};
+  Averages to{width, 0, std::vector<std::vector<float>>(maps.size()), remaining};
   for (std::size_t first = 0; first < height; first += kStripRows) {
     const std::size_t last = std::min(height, first + kStripRows);
     to.firstRow = first;
-    for (std::size_t m = 0; m < kMaps; ++m) {
+    for (std::size_t m = 0; m < maps.size(); ++m) {
       const auto from = maps[m]->pixels.begin() + static_cast<std::ptrdiff_t>(first * width * 3);
       to.strip[m].assign(from, from + static_cast<std::ptrdiff_t>((last - first) * width * 3));
     }
@@ -397,7 +433,7 @@ void averagePage(const std::array<Image*, kMaps>& maps, const Judged& judged, co
       }
     });
     if (last < height) before.keepBefore(static_cast<std::ptrdiff_t>(last));
-    for (std::size_t m = 0; m < kMaps; ++m)
+    for (std::size_t m = 0; m < maps.size(); ++m)
       std::copy(to.strip[m].begin(), to.strip[m].end(),
                 maps[m]->pixels.begin() + static_cast<std::ptrdiff_t>(first * width * 3));
   }
@@ -417,7 +453,7 @@ std::vector<double> lightOfCharts(const Image& flat, std::span<const std::uint32
 
 /// Gives every chart back the light that averaging took where it curves, in proportion to what its texels hold: shared
 /// by their noise, a texel that is dark but for one map would gain many times what that map holds.
-void restoreLight(const std::array<Image*, kMaps>& maps, std::span<const std::uint32_t> chartIds,
+void restoreLight(std::span<Image* const> maps, std::span<const std::uint32_t> chartIds,
                   const std::vector<double>& before) {
   std::vector<double> gain = lightOfCharts(*maps[0], chartIds);
   for (std::size_t c = 0; c < gain.size(); ++c) {
@@ -434,11 +470,13 @@ void restoreLight(const std::array<Image*, kMaps>& maps, std::span<const std::ui
 
 }  // namespace
 
-void denoise(Image& flat, std::array<Image, 3>& rnm, std::span<const std::uint32_t> chartIds,
+void denoise(Image& flat, std::span<Image> encoded, std::span<const std::uint32_t> chartIds,
              std::span<const CoarseNormal> normals, std::span<const float> standardError, std::size_t stride) {
   const std::size_t count = static_cast<std::size_t>(flat.width) * static_cast<std::size_t>(flat.height);
   LUMEL_CHECK(chartIds.size() == count && standardError.size() + stride > count * stride);
-  const std::array<Image*, kMaps> maps{&flat, &rnm[0], &rnm[1], &rnm[2]};
+  LUMEL_CHECK(!encoded.empty() && encoded.size() <= kMostMaps);
+  std::vector<Image*> maps{&flat};
+  for (Image& map : encoded) maps.push_back(&map);
   for (const Image* map : maps)
     LUMEL_CHECK(map->width == flat.width && map->height == flat.height && map->channels == 3);
   if (chartIds.empty()) return;

@@ -108,6 +108,18 @@ Vec3 fitKernels(const Mat3& matrix, const std::vector<Vec3>& table, const Vec3& 
 
 }  // namespace
 
+const char* nameOf(Projection projection) {
+  switch (projection) {
+    case Projection::Raw:
+      return "raw";
+    case Projection::Flat:
+      return "flat";
+    case Projection::Fit:
+      return "fit";
+  }
+  return "?";
+}
+
 RnmKernels::RnmKernels(Projection projection) : projection_(projection) {
   if (projection != Projection::Fit) return;
   const ConeNormals cone;

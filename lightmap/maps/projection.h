@@ -15,6 +15,7 @@ enum class Projection {
   Flat,  // raw, then scaled per texel and colour so that the maps' mean is the flat irradiance / pi (default)
   Fit,   // least squares for the squared decode over normals within 30 degrees of flat, non-negative, exact at flat
 };
+const char* nameOf(Projection projection);  // "raw", "flat", "fit"
 
 /// Evaluates the three kernels for a unit direction in tangent space. Directions with w.z <= 0 (below the surface)
 /// give zero: light comes from above the surface only. Fit interpolates a table, within 5e-4 of the exact kernels; its

@@ -4,6 +4,18 @@
 
 namespace lumel {
 
+const char* nameOf(RnmDecode decode) {
+  switch (decode) {
+    case RnmDecode::Squared:
+      return "squared";
+    case RnmDecode::Linear:
+      return "linear";
+    case RnmDecode::LinearNormalized:
+      return "linear-normalized";
+  }
+  return "?";
+}
+
 Vec3 rnmWeights(const Vec3& normalTangent, RnmDecode decode) {
   Vec3 w;
   for (int i = 0; i < 3; ++i) w[i] = std::max(0.0f, glm::dot(normalTangent, kRnmBasis[static_cast<std::size_t>(i)]));

@@ -19,6 +19,7 @@ inline constexpr std::array<Vec3, 3> kRnmBasis = {
 /// Squared: w_i = saturate(N.B_i)^2 / sum_j saturate(N.B_j)^2.
 /// Linear: w_i = saturate(N.B_i), not divided. LinearNormalized: divided by their sum.
 enum class RnmDecode { Squared, Linear, LinearNormalized };
+const char* nameOf(RnmDecode decode);  // "squared", "linear", "linear-normalized"
 
 /// Weights of the three maps for a unit tangent-space normal. Where no basis vector sees the normal: all zero.
 Vec3 rnmWeights(const Vec3& normalTangent, RnmDecode decode = RnmDecode::Squared);

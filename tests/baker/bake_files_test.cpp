@@ -7,6 +7,7 @@
 
 #include "baker/files/read/baked_scene.h"
 #include "scene/files/file_set.h"
+#include "scene/images/image_io.h"
 #include "tests/mentions.h"
 #include "tests/scratch.h"
 
@@ -26,7 +27,7 @@ struct Fixture {
     scene.materials.resize(1);
     for (int i = 0; i < pages; ++i) {
       BakedPage page;
-      for (Image& map : page.rnm) map = Image(8, 4, 3, value);
+      page.maps.assign(record.bakeOptions.encoding->mapCount(), Image(8, 4, 3, value));
       page.flat = Image(8, 4, 3, value);
       page.aux = Image(8, 4, 4, 1.0f);
       result.pages.push_back(page);
@@ -130,12 +131,74 @@ TEST(BakeFiles, ReadBackIsWhatWasWritten) {
   const auto baked = readBake(dir);
   ASSERT_TRUE(baked) << baked.error().message;
   ASSERT_EQ(baked->pages.size(), 2u);
-  EXPECT_EQ(baked->pages[1][2].pixels, fixture.result.pages[1].rnm[2].pixels);
-  EXPECT_EQ(baked->decode, RnmDecode::Squared);
+  EXPECT_EQ(baked->pages[1][2].pixels, fixture.result.pages[1].maps[2].pixels);
+  EXPECT_EQ(baked->encoding->conventions(), fixture.record.bakeOptions.encoding->conventions());
   EXPECT_EQ(baked->meanFlat, Vec3(0.25f));
   EXPECT_EQ(baked->scene.environment.rotationDegrees, 30.0f);
   EXPECT_EQ(baked->scene.environment.strength, 0.5f);
   EXPECT_EQ(baked->scene.environment.image.pixels, fixture.scene.environment.image.pixels);
+}
+
+/// Writes bake.json anew after change(json).
+template <class Change>
+void changeBakeJson(const fs::path& dir, const Change& change) {
+  auto json = readBakeJson(dir);
+  ASSERT_TRUE(json) << json.error().message;
+  change(*json);
+  std::ofstream(dir / "bake.json") << *json;
+}
+
+TEST(BakeFiles, EncodingMapsAndDecodeAreNamed) {
+  const fs::path dir = scratch();
+  Fixture fixture(1);
+  fixture.record.bakeOptions.encoding = sh1Encoding();
+  fixture.result.pages[0].maps.assign(4, Image(8, 4, 3, -0.5f));
+  ASSERT_TRUE(fixture.write(dir));
+  const auto json = readBakeJson(dir);
+  ASSERT_TRUE(json);
+  EXPECT_EQ(json->at("encoding").at("name"), "sh1");
+  EXPECT_EQ(json->at("encoding").at("maps"), nlohmann::ordered_json(sh1Encoding()->mapNames()));
+  EXPECT_EQ(json->at("encoding").at("signed"), true);
+  EXPECT_TRUE(mentions(json->at("conventions").at("decodeFormula"), "L0 + N.x Lx"));
+  EXPECT_EQ(json->at("pages")[0].at("files").at("sh1").size(), 4u);
+  const auto image = readImage(dir / "lightmap-0-sh1-x.exr");
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_EQ(image->metadata.at("lumel:encoding"), "sh1");
+  EXPECT_EQ(image->metadata.at("lumel:maps"), "sh1-0 sh1-x sh1-y sh1-z");
+  EXPECT_EQ(image->metadata.at("lumel:decode"), "sh1");
+  EXPECT_EQ(image->image.pixels[0], -0.5f);
+  // A bake of other maps takes their place.
+  ASSERT_TRUE(Fixture(1).write(dir));
+  EXPECT_FALSE(fs::exists(dir / "lightmap-0-sh1-x.exr"));
+}
+
+TEST(BakeFiles, ABakeFromBeforeEncodingsWereNamedIsOneOfRnm) {
+  const fs::path dir = scratch();
+  const Fixture fixture(1, 0.25f);
+  ASSERT_TRUE(fixture.write(dir));
+  changeBakeJson(dir, [](auto& json) {
+    json.erase("encoding");
+    json["conventions"]["decode"] = "linear";
+  });
+  const auto baked = readBake(dir);
+  ASSERT_TRUE(baked) << baked.error().message;
+  EXPECT_EQ(baked->encoding->name(), "rnm");
+  EXPECT_EQ(baked->encoding->conventions().at("decode"), "linear");
+  EXPECT_EQ(baked->pages[0].size(), 3u);
+}
+
+TEST(BakeFiles, AnEncodingThatIsNotKnownIsNamedWithTheVersionThatHasIt) {
+  const fs::path dir = scratch();
+  ASSERT_TRUE(Fixture(1).write(dir));
+  changeBakeJson(dir, [](auto& json) {
+    json["encoding"]["name"] = "sh9";
+    json["lumel"] = "7.8.9";
+  });
+  const auto baked = readBake(dir);
+  ASSERT_FALSE(baked);
+  EXPECT_EQ(baked.error().kind, ErrorKind::Input);
+  for (const char* word : {"bake.json", "'sh9'", "7.8.9"})
+    EXPECT_TRUE(mentions(baked.error().message, word)) << baked.error().message;
 }
 
 TEST(BakeFiles, DamagedResultsAreNamed) {

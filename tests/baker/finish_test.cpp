@@ -18,7 +18,7 @@ struct Fixture {
     t.width = 6;
     t.height = 1;
     BakedPage& page = pages[0];
-    for (Image& map : page.rnm) map = Image(6, 1, 3);
+    page.maps.assign(3, Image(6, 1, 3));
     page.flat = Image(6, 1, 3);
     page.aux = Image(6, 1, 4);
     for (const auto& [x, triangle, light, validity] : {std::tuple(0, 0u, 1.0f, 1.0f), std::tuple(1, 0u, 3.0f, 0.6f),
@@ -26,7 +26,7 @@ struct Fixture {
       t.coords.push_back({static_cast<std::uint16_t>(x), 0});
       t.firstTriangle.push_back(static_cast<std::uint32_t>(t.triangles.size()));
       t.triangles.push_back({0, triangle});
-      for (Image& map : page.rnm) map.setRgb(x, 0, Vec3(light));
+      for (Image& map : page.maps) map.setRgb(x, 0, Vec3(light));
       page.flat.setRgb(x, 0, Vec3(light));
       page.aux.at(x, 0)[0] = 1.0f;
       page.aux.at(x, 0)[1] = validity;
@@ -39,7 +39,7 @@ TEST(Finish, InvalidTexelsTakeTheLightOfTheirChart) {
   Fixture f;
   const Image auxBefore = f.pages[0].aux;
   finishPages(f.pages, f.atlas, f.texels, {});
-  for (const Image* map : {&f.pages[0].rnm[0], &f.pages[0].rnm[2], &f.pages[0].flat}) {
+  for (const Image* map : {&f.pages[0].maps[0], &f.pages[0].maps[2], &f.pages[0].flat}) {
     EXPECT_EQ(map->rgb(0, 0).x, 1.0f);
     EXPECT_EQ(map->rgb(1, 0).x, 3.0f);
     EXPECT_EQ(map->rgb(2, 0).x, 3.0f);   // from texel 1, the nearest valid one of its chart

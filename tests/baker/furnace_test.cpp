@@ -29,7 +29,7 @@ Mean furnace(float albedo, int bounces, int samples) {
     const BakeResult result = test.bake({.samples = samples,
                                          .bounces = bounces,
                                          .seed = static_cast<std::uint64_t>(seed) + 1,
-                                         .projection = Projection::Raw});
+                                         .encoding = rnmEncoding(Projection::Raw)});
     double mean = 0;
     for (const BakedPage& page : result.pages) mean += luminanceMean(page.flat) / 6;
     sum += mean;

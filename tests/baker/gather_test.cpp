@@ -154,9 +154,11 @@ double meanOfValid(const Image& map, const Image& aux) {
 /// which is the noise of a path traced page that light reaches by several bounces alone.
 void expectAgreementWithPath(TestScene test, int bounces, double tolerance, int samples, int pathSamples) {
   test.integrator = Integrator::Path;
-  const BakeResult path = test.bake({.samples = pathSamples, .bounces = bounces, .projection = Projection::Raw});
+  const BakeResult path =
+      test.bake({.samples = pathSamples, .bounces = bounces, .encoding = rnmEncoding(Projection::Raw)});
   test.integrator = Integrator::Gather;
-  const BakeResult gather = test.bake({.samples = samples, .bounces = bounces, .projection = Projection::Raw});
+  const BakeResult gather =
+      test.bake({.samples = samples, .bounces = bounces, .encoding = rnmEncoding(Projection::Raw)});
   ASSERT_EQ(path.pages.size(), gather.pages.size());
   double brightest = 0;
   for (const BakedPage& page : path.pages) brightest = std::max(brightest, meanOf(page));
@@ -164,7 +166,7 @@ void expectAgreementWithPath(TestScene test, int bounces, double tolerance, int 
   for (std::size_t p = 0; p < path.pages.size(); ++p)
     for (std::size_t i = 0; i < 4; ++i) {
       const auto mean = [&](const BakedPage& page) {
-        return meanOfValid(i == 0 ? page.flat : page.rnm[i - 1], path.pages[p].aux);
+        return meanOfValid(i == 0 ? page.flat : page.maps[i - 1], path.pages[p].aux);
       };
       const double expected = mean(path.pages[p]);
       EXPECT_NEAR(mean(gather.pages[p]), expected, tolerance * expected + 3e-3 * brightest)
@@ -504,7 +506,7 @@ TEST(Gather, SamplesUntilTheTargetErrorIsMet) {
 /// seen of it: the root of light by that of the mean.
 double seenDifference(const BakedPage& a, const BakedPage& b, double mean) {
   const std::array<std::pair<const Image*, const Image*>, 4> maps = {
-      {{&a.flat, &b.flat}, {&a.rnm[0], &b.rnm[0]}, {&a.rnm[1], &b.rnm[1]}, {&a.rnm[2], &b.rnm[2]}}};
+      {{&a.flat, &b.flat}, {&a.maps[0], &b.maps[0]}, {&a.maps[1], &b.maps[1]}, {&a.maps[2], &b.maps[2]}}};
   double worst = 0;
   for (const auto& [one, other] : maps) {
     double sum = 0;
@@ -567,7 +569,7 @@ TEST(Gather, TheTargetIsMetByEveryMap) {
   for (int y = 0; y < 16; ++y)
     for (int x = 0; x < 16; ++x)
       for (std::size_t k = 0; k < 3; ++k)
-        within += std::abs(luminance(page.rnm[k].rgb(x, y)) - luminance(truth.rnm[k].rgb(x, y))) <=
+        within += std::abs(luminance(page.maps[k].rgb(x, y)) - luminance(truth.maps[k].rgb(x, y))) <=
                   1.96f * target * luminance(truth.flat.rgb(x, y));
   const double share = static_cast<double>(within) / (3 * 16 * 16);
   std::printf("within 1.96 times the target: %.1f%%\n", 100 * share);

@@ -163,8 +163,9 @@ std::vector<Vec3d> clipAbove(const std::vector<Vec3d>& polygon, const Vec3d& axi
 bool sameBytes(const BakeResult& a, const BakeResult& b) {
   if (a.pages.size() != b.pages.size()) return false;
   for (std::size_t p = 0; p < a.pages.size(); ++p) {
-    for (std::size_t i = 0; i < 3; ++i)
-      if (!sameBytes(a.pages[p].rnm[i], b.pages[p].rnm[i])) return false;
+    if (a.pages[p].maps.size() != b.pages[p].maps.size()) return false;
+    for (std::size_t i = 0; i < a.pages[p].maps.size(); ++i)
+      if (!sameBytes(a.pages[p].maps[i], b.pages[p].maps[i])) return false;
     if (!sameBytes(a.pages[p].flat, b.pages[p].flat) || !sameBytes(a.pages[p].aux, b.pages[p].aux)) return false;
   }
   return a.stats.rays == b.stats.rays && a.stats.shadowRays == b.stats.shadowRays &&
@@ -197,7 +198,7 @@ Vec3d axisInWorld(const TestScene& test, int page, int basis) {
 
 Deviation deviation(const TestScene& test, BakeOptions options, int page,
                     const std::function<Maps(const Vec3d&)>& expected) {
-  options.projection = Projection::Raw;
+  options.encoding = rnmEncoding(Projection::Raw);
   const auto p = static_cast<std::size_t>(page);
   const Surface* surface = nullptr;
   for (const Surface& s : test.atlas.surfaces)
@@ -221,7 +222,7 @@ Deviation deviation(const TestScene& test, BakeOptions options, int page,
     for (int y = 0; y < n; ++y)
       for (int x = 0; x < n; ++x)
         for (std::size_t m = 0; m < 4; ++m) {
-          const Image& image = m == 0 ? result.pages[p].flat : result.pages[p].rnm[m - 1];
+          const Image& image = m == 0 ? result.pages[p].flat : result.pages[p].maps[m - 1];
           mean[m] += static_cast<double>(luminance(image.rgb(x, y))) / (n * n);
         }
     for (std::size_t m = 0; m < 4; ++m) {

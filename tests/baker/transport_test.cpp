@@ -251,7 +251,7 @@ TEST(Transport, ProjectionResidualMatchesDesign) {
   TestScene test;
   test.addRectangle({-1, 0, 1}, {2, 0, 0}, {0, 0, -2});
   test.scene.environment.color = Vec3(1.0f);
-  const BakeResult result = test.bake({.samples = 1024, .bounces = 0, .projection = Projection::Flat});
+  const BakeResult result = test.bake({.samples = 1024, .bounces = 0});
   const auto loss = [](double degrees) { return (1 - std::cos(degrees * std::numbers::pi / 180)) / 2; };
   const double expected = std::sqrt(3.0 / 7 * (loss(15) * loss(15) + loss(30) * loss(30)));
   EXPECT_NEAR(result.stats.projectionResidual, expected, 0.002);  // noise of 1024 samples

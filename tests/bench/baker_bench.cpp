@@ -240,7 +240,7 @@ void BM_Accumulate(benchmark::State& state) {
     const Vec3& w = directions[i++ % directions.size()];
     const Vec3 k = kernels(w);
     const Vec3 light(0.3f, 0.2f, 0.1f);
-    sums.add({light * w.z, {light * k.x, light * k.y, light * k.z}}, static_cast<int>(i % TexelSums::kBatches));
+    sums.add({light * w.z, {light * k.x, light * k.y, light * k.z}}, 3, static_cast<int>(i % TexelSums::kBatches));
   }
   benchmark::DoNotOptimize(sums);
   state.SetItemsProcessed(state.iterations());

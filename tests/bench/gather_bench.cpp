@@ -46,7 +46,12 @@ struct Fixture {
         light(transport.light()),
         map(*transport.rays, grid.atlas, transport.texels),
         waves(transport.texels),
-        scene{.transport = light, .kernels = kernels, .atlas = grid.atlas, .texels = transport.texels, .map = map, .waves = waves} {
+        scene{.transport = light,
+              .encoding = *encoding,
+              .atlas = grid.atlas,
+              .texels = transport.texels,
+              .map = map,
+              .waves = waves} {
     scene.levels = {.count = 1, .base = 0, .endless = true};
     scene.lastDepth = 64;
     for (std::size_t t = 0; t < map.size(); ++t) {
@@ -67,8 +72,7 @@ struct Fixture {
     for (std::size_t first = 0; first < page.size(); first += kLanes) {
       const std::size_t count = std::min<std::size_t>(kLanes, page.size() - first);
       GatheredWave counts;
-      const auto warm =
-          WarmWave(scene, 0, first, count).warmUp(std::span(links).first(count * kWarmRays), counts);
+      const auto warm = WarmWave(scene, 0, first, count).warmUp(std::span(links).first(count * kWarmRays), counts);
       for (std::size_t i = 0; i < count; ++i) uneven[first + i] = warm[i].isUneven() ? 1 : 0;
     }
     map.setUneven(uneven);
@@ -81,7 +85,7 @@ struct Fixture {
   GridScene grid;
   Transport transport;
   LightTransport light;
-  RnmKernels kernels{Projection::Flat};
+  std::shared_ptr<const Encoding> encoding = rnmEncoding();
   TexelMap map;
   Waves waves;
   GatherScene scene;
@@ -184,7 +188,7 @@ Split splitOf(Work work) {
 
 struct Maps {
   Vec3d flat{0};
-  std::array<Vec3d, 3> rnm{Vec3d(0), Vec3d(0), Vec3d(0)};
+  std::array<Vec3d, kMostMaps> encoded{};
 };
 
 struct NaiveRay {
@@ -246,9 +250,9 @@ Maps gatherNaively(const Fixture& f, std::size_t texel, std::uint32_t samples) {
     const std::uint32_t found = f.pixels[f.pixelOf(x, y)];
     if (found == kNoTexel) return;
     const Vec3 light = f.reflected[found] * (kInvPi / made.pdf);
-    const Vec3 k = f.kernels(made.local);
+    const MapKernels k = f.encoding->kernels(made.local);
     maps.flat += Vec3d(light * made.local.z);
-    for (int i = 0; i < 3; ++i) maps.rnm[static_cast<std::size_t>(i)] += Vec3d(light * k[i]);
+    for (std::size_t i = 0; i < f.encoding->mapCount(); ++i) maps.encoded[i] += Vec3d(light * k[i]);
   });
   return maps;
 }

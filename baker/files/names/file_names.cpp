@@ -1,9 +1,15 @@
 #include "baker/files/names/file_names.h"
 
+#include <algorithm>
 #include <string_view>
+
+#include "lightmap/maps/encoding.h"
 
 namespace lumel {
 namespace {
+
+constexpr const char* kFlat = "flat";
+constexpr const char* kAux = "aux";
 
 bool isPageImage(const std::string& name) {
   constexpr std::string_view prefix = "lightmap-";
@@ -11,13 +17,20 @@ bool isPageImage(const std::string& name) {
   const std::size_t dash = name.find_first_not_of("0123456789", prefix.size());
   if (dash == std::string::npos || dash == prefix.size()) return false;
   const std::string rest = name.substr(dash);
-  return rest == "-rnm0.exr" || rest == "-rnm1.exr" || rest == "-rnm2.exr" || rest == "-flat.exr" || rest == "-aux.exr";
+  const auto isRest = [&rest](const std::string& kind) { return rest == "-" + kind + ".exr"; };
+  return isRest(kFlat) || isRest(kAux) || std::any_of(knownMapNames().begin(), knownMapNames().end(), isRest);
 }
 
 }  // namespace
 
 std::string pageFileName(std::size_t page, const std::string& kind) {
   return "lightmap-" + std::to_string(page) + "-" + kind + ".exr";
+}
+
+std::vector<std::string> lightKinds(const std::vector<std::string>& mapNames) {
+  std::vector<std::string> kinds = mapNames;
+  if (std::find(kinds.begin(), kinds.end(), kFlat) == kinds.end()) kinds.push_back(kFlat);
+  return kinds;
 }
 
 bool isBakeFile(const std::string& name) {

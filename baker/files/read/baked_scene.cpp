@@ -4,7 +4,6 @@
 #include <iterator>
 
 #include "baker/files/names/bake_format.h"
-#include "baker/files/names/conventions.h"
 #include "baker/files/names/file_names.h"
 #include "scene/images/image_io.h"
 #include "scene/load/load_scene.h"
@@ -56,16 +55,6 @@ class Reader {
   std::string path_;
 };
 
-Expected<RnmDecode> readDecode(const Reader& root) {
-  const auto conventions = root.at("conventions");
-  if (!conventions) return conventions.error();
-  const auto name = conventions->textAt("decode");
-  if (!name) return name.error();
-  for (RnmDecode decode : {RnmDecode::Squared, RnmDecode::Linear, RnmDecode::LinearNormalized})
-    if (*name == nameOf(decode)) return decode;
-  return conventions->wrong("a decode known here ('" + *name + "')");
-}
-
 Expected<void> readPages(const Reader& root, const fs::path& dir, BakedScene& baked) {
   const auto pages = root.at("pages");
   if (!pages) return pages.error();
@@ -83,15 +72,15 @@ Expected<void> readPages(const Reader& root, const fs::path& dir, BakedScene& ba
     if (!mean) return mean.error();
     texels += *covered;
     light += Vec3d(*mean) * *covered;
-    std::array<Image, 3>& maps = baked.pages.emplace_back();
-    for (std::size_t k = 0; k < maps.size(); ++k) {
-      const fs::path file = dir / pageFileName(i, "rnm" + std::to_string(k));
+    std::vector<Image>& maps = baked.pages.emplace_back();
+    for (const std::string& name : baked.encoding->mapNames()) {
+      const fs::path file = dir / pageFileName(i, name);
       auto loaded = readImage(file);
       if (!loaded) return loaded.error();
       if (loaded->image.channels != 3 || loaded->image.width != static_cast<int>(*width) ||
           loaded->image.height != static_cast<int>(*height))
         return inputError(file.string() + ": its size or channels differ from bake.json; bake again");
-      maps[k] = std::move(loaded->image);
+      maps.push_back(std::move(loaded->image));
     }
   }
   if (texels > 0.0) baked.meanFlat = Vec3(light / texels);
@@ -152,14 +141,35 @@ Expected<Json> readBakeJson(const fs::path& dir) {
   return json;
 }
 
+Expected<std::shared_ptr<const Encoding>> encodingOf(const Json& bake, const std::string& file) {
+  const Reader root(bake, file);
+  std::string name = "rnm";
+  if (bake.contains("encoding")) {
+    const auto stated = root.at("encoding")->textAt("name");
+    if (!stated) return stated.error();
+    name = *stated;
+  }
+  const auto stated = root.at("conventions");
+  if (!stated) return stated.error();
+  Conventions conventions;
+  for (const auto& [key, text] : stated->json().items())
+    if (text.is_string()) conventions[key] = text.get<std::string>();
+  auto encoding = findEncoding(name, conventions);
+  if (encoding) return encoding;
+  const Json version = bake.value("lumel", Json());
+  return inputError(file + ": " + encoding.error().message + "; use version " +
+                    (version.is_string() ? version.get<std::string>() : "?") + ", which baked it, or bake again");
+}
+
 Expected<BakedScene> readBake(const fs::path& dir) {
   const auto json = readBakeJson(dir);
   if (!json) return json.error();
-  const Reader root(*json, (dir / "bake.json").string());
+  const std::string file = (dir / "bake.json").string();
+  const Reader root(*json, file);
   BakedScene baked;
-  const auto decode = readDecode(root);
-  if (!decode) return decode.error();
-  baked.decode = *decode;
+  auto encoding = encodingOf(*json, file);
+  if (!encoding) return encoding.error();
+  baked.encoding = std::move(*encoding);
   auto scene = loadScene(dir / "scene.glb");
   if (!scene) return scene.error();
   baked.scene = std::move(*scene);

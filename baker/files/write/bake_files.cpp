@@ -15,7 +15,11 @@ namespace fs = std::filesystem;
 
 std::map<std::string, std::string> pageMetadata(std::size_t page, const std::string& kind, const BakeRecord& record) {
   std::map<std::string, std::string> metadata;
-  for (const auto& [key, text] : describeConventions(record.bakeOptions.projection)) metadata["lumel:" + key] = text;
+  const Encoding& encoding = *record.bakeOptions.encoding;
+  for (const auto& [key, text] : describeConventions(encoding)) metadata["lumel:" + key] = text;
+  metadata["lumel:encoding"] = encoding.name();
+  for (const std::string& name : encoding.mapNames())
+    metadata["lumel:maps"] += (metadata["lumel:maps"].empty() ? "" : " ") + name;
   metadata["lumel:version"] = kVersion;
   metadata["lumel:page"] = std::to_string(page);
   metadata["lumel:map"] = kind;
@@ -28,7 +32,8 @@ std::map<std::string, std::string> pageMetadata(std::size_t page, const std::str
     metadata["lumel:units"] =
         "coverage: area share 0..1; validity: share of gather rays that met no back face; stderr: standard error of "
         "the flat map's luminance; samples: gather rays";
-    for (const char* key : {"decode", "decodeFormula", "basis", "order"}) metadata.erase(std::string("lumel:") + key);
+    for (const char* key : {"decode", "decodeFormula", "basis", "order", "encoding", "maps"})
+      metadata.erase(std::string("lumel:") + key);
   }
   return metadata;
 }
@@ -52,9 +57,10 @@ Expected<void> addPage(FileSet& set, const fs::path& dir, std::size_t page, cons
     files.push_back({std::move(*file), &image, options});
     return {};
   };
-  for (std::size_t i = 0; i < 3; ++i)
-    if (auto added = add("rnm" + std::to_string(i), baked.rnm[i]); !added) return added;
-  if (auto added = add("flat", baked.flat); !added) return added;
+  const std::vector<std::string>& mapNames = record.bakeOptions.encoding->mapNames();
+  const std::vector<std::string> kinds = lightKinds(mapNames);
+  for (std::size_t i = 0; i < kinds.size(); ++i)
+    if (auto added = add(kinds[i], i < mapNames.size() ? baked.maps[i] : baked.flat); !added) return added;
   // Sample counts and coverage are exact in float only.
   options.format = PixelFormat::Float;
   options.noisy = false;

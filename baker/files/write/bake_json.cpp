@@ -14,7 +14,7 @@ using Json = nlohmann::ordered_json;
 
 Json toJson(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 
-Json describePage(std::size_t index, const BakedPage& page, std::size_t charts) {
+Json describePage(std::size_t index, const BakedPage& page, const Encoding& encoding, std::size_t charts) {
   std::size_t covered = 0;
   std::size_t invalid = 0;
   double area = 0.0;
@@ -35,9 +35,10 @@ Json describePage(std::size_t index, const BakedPage& page, std::size_t charts) 
     }
   const double texels = static_cast<double>(page.aux.width) * static_cast<double>(page.aux.height);
   const Vec3d mean = counted > 0 ? sum / static_cast<double>(counted) : sum;
-  Json files = {{"rnm", {pageFileName(index, "rnm0"), pageFileName(index, "rnm1"), pageFileName(index, "rnm2")}},
-                {"flat", pageFileName(index, "flat")},
-                {"aux", pageFileName(index, "aux")}};
+  Json files = Json::object();
+  for (const std::string& name : encoding.mapNames()) files[encoding.name()].push_back(pageFileName(index, name));
+  files["flat"] = pageFileName(index, "flat");
+  files["aux"] = pageFileName(index, "aux");
   return {{"page", index},
           {"width", page.aux.width},
           {"height", page.aux.height},
@@ -50,14 +51,15 @@ Json describePage(std::size_t index, const BakedPage& page, std::size_t charts) 
           {"files", std::move(files)}};
 }
 
-Json describePages(const Atlas& atlas, const BakeResult& result) {
+Json describePages(const Atlas& atlas, const BakeResult& result, const Encoding& encoding) {
   std::vector<std::size_t> charts(result.pages.size(), 0);
   for (const Chart& chart : atlas.charts)
     if (const auto page = static_cast<std::size_t>(atlas.surfaces[static_cast<std::size_t>(chart.surface)].page);
         page < charts.size())
       ++charts[page];
   Json pages = Json::array();
-  for (std::size_t i = 0; i < result.pages.size(); ++i) pages.push_back(describePage(i, result.pages[i], charts[i]));
+  for (std::size_t i = 0; i < result.pages.size(); ++i)
+    pages.push_back(describePage(i, result.pages[i], encoding, charts[i]));
   return pages;
 }
 
@@ -115,6 +117,13 @@ Json describeSky(const Environment& sky) {
   return json;
 }
 
+Json describeEncoding(const Encoding& encoding) {
+  return {{"name", encoding.name()},
+          {"maps", encoding.mapNames()},
+          {"domain", nameOf(encoding.domain())},
+          {"signed", encoding.isSigned()}};
+}
+
 Json describeScene(const Scene& scene, const BakeRecord& record) {
   return {{"file", record.sceneFile.string()},
           {"instances", scene.instances.size()},
@@ -153,12 +162,14 @@ std::string describeBake(const Scene& scene, const AtlasResult& atlas, const Bak
                          const BakeRecord& record) {
   std::vector<std::string> warnings = scene.report.warnings;
   warnings.insert(warnings.end(), atlas.report.warnings.begin(), atlas.report.warnings.end());
+  const Encoding& encoding = *record.bakeOptions.encoding;
   Json json;
   json["format"] = kBakeFormat;
   json["lumel"] = kVersion;
   json["scene"] = describeScene(scene, record);
   json["settings"] = record.settings;
-  json["conventions"] = describeConventions(record.bakeOptions.projection);
+  json["encoding"] = describeEncoding(encoding);
+  json["conventions"] = describeConventions(encoding);
   json["conventions"]["aux"] = "channels coverage, validity, stderr, samples, by name (EXR files sort channels)";
   json["sky"] = describeSky(scene.environment);
   json["atlas"] = {{"texelsPerMeter", atlas.atlas.texelsPerMeter},
@@ -168,7 +179,7 @@ std::string describeBake(const Scene& scene, const AtlasResult& atlas, const Bak
                    {"degenerateTriangles", atlas.report.degenerateTriangles},
                    {"sceneUvs", describeSceneUvs(atlas.report)},
                    {"layout", describeLayout(atlas.atlas, record.atlasOptions)}};
-  json["pages"] = describePages(atlas.atlas, result);
+  json["pages"] = describePages(atlas.atlas, result, encoding);
   json["cost"] = {
       {"texels", result.stats.texels}, {"rays", result.stats.rays}, {"shadowRays", result.stats.shadowRays}};
   json["error"] = describeError(result.stats);

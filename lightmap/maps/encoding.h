@@ -1,0 +1,99 @@
+// Light encodings: how the light that reaches a texel is spread over a few maps, and how a reader turns these back into
+// the light on a normal. An encoding is an entry in encodings.cpp; nothing outside of this folder knows how many maps
+// one has. The flat map (irradiance / pi on the texel's own normal) is kept beside every encoding, as the measure for
+// errors and as what surfaces reflect.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "lightmap/maps/projection.h"
+#include "scene/base/expected.h"
+#include "scene/base/math.h"
+
+namespace lumel {
+
+/// The most maps that an encoding may have.
+inline constexpr std::size_t kMostMaps = 6;
+
+/// The directions from which light counts: those above the surface, or all of them.
+enum class Domain { Hemisphere, Sphere };
+const char* nameOf(Domain domain);  // "hemisphere", "sphere"
+
+/// The kernels K_i of one direction: one for each map, the rest 0.
+using MapKernels = std::array<float, kMostMaps>;
+
+/// The kernels of 16 directions: a row for each map; rows beyond those are left as they are.
+inline constexpr std::size_t kKernelLanes = 16;
+struct alignas(64) KernelLanes {
+  float of[kMostMaps][kKernelLanes];
+};
+
+/// Key and text, keys without a prefix. Every encoding states basis, order, decode (a name) and decodeFormula.
+using Conventions = std::map<std::string, std::string>;
+
+/// Maps hold c_i = (1/pi) Integral L(w) K_i(w) dw in tangent space (t, b, n), RGB; so they are irradiance / pi.
+class Encoding {
+ public:
+  virtual ~Encoding() = default;
+  Encoding(const Encoding&) = delete;
+  Encoding& operator=(const Encoding&) = delete;
+
+  const std::string& name() const { return traits_.name; }
+  /// The maps' names in their order, 1 to kMostMaps of them. They are parts of file names; "flat" is the flat map's.
+  const std::vector<std::string>& mapNames() const { return traits_.mapNames; }
+  std::size_t mapCount() const { return traits_.mapNames.size(); }
+  Domain domain() const { return traits_.domain; }
+  /// Whether maps may be negative where light is not.
+  bool isSigned() const { return traits_.isSigned; }
+  const Conventions& conventions() const { return traits_.conventions; }
+
+  /// `dirTangent`: unit length, in tangent space.
+  virtual MapKernels kernels(const Vec3& dirTangent) const = 0;
+  /// The same for 16 directions, coordinate by coordinate; any finite ones, so that lanes may be left unused.
+  virtual void laneKernels(const float* x, const float* y, const float* z, KernelLanes& lanes) const;
+
+  /// What becomes of a texel's means, mapCount() of them, before they are stored. `flat`: the flat map's mean.
+  virtual void finish(std::span<Vec3> maps, const Vec3& flat) const;
+
+  /// Irradiance / pi on a unit normal in tangent space, of stored maps.
+  virtual Vec3 decode(std::span<const Vec3> maps, const Vec3& normalTangent) const = 0;
+
+ protected:
+  struct Traits {
+    std::string name;
+    std::vector<std::string> mapNames;
+    Domain domain = Domain::Hemisphere;
+    bool isSigned = false;
+    Conventions conventions;
+  };
+  explicit Encoding(Traits traits) : traits_(std::move(traits)) {}
+
+ private:
+  const Traits traits_;
+};
+
+/// The three RNM maps. `projection` is how light is spread over them, `decode` how readers weigh them.
+std::shared_ptr<const Encoding> rnmEncoding(Projection projection = Projection::Flat,
+                                            RnmDecode decode = RnmDecode::Squared);
+/// The flat map as an encoding of its own: the same light on every normal.
+std::shared_ptr<const Encoding> flatEncoding();
+/// Two bands of spherical harmonics: L0 and the vector (Lx, Ly, Lz), with which irradiance / pi is L0 + N.L. Exact for
+/// the first two bands of the clamped cosine (Ramamoorthi and Hanrahan 2001); negative on normals that face away from
+/// concentrated light.
+std::shared_ptr<const Encoding> sh1Encoding();
+
+/// The encoding of that name, as the conventions of a file state it; those that are missing have their defaults.
+/// Errors: Input, naming what is not known.
+Expected<std::shared_ptr<const Encoding>> findEncoding(std::string_view name, const Conventions& conventions);
+
+/// The names of all encodings' maps.
+const std::vector<std::string>& knownMapNames();
+
+}  // namespace lumel
