@@ -34,7 +34,7 @@ struct RenderArguments {
   int width = 0;
   int height = 0;
   int samplesPerPixel = 16;
-  RenderMode mode = RenderMode::Lit;
+  std::size_t mode = 0;  // of shadings()
   std::optional<float> exposure;
   ToneMap toneMap = ToneMap::Aces;
   int threads = 0;
@@ -49,8 +49,7 @@ void declareOptions(OptionTable& options, RenderArguments& a) {
   options.integer("width", a.width, {0, 16384}, "Pixels").defaultText = std::to_string(kDefaultWidth);
   options.integer("height", a.height, {0, 16384}, "Pixels").defaultText = "by the camera's aspect, else 16:9";
   options.integer("spp", a.samplesPerPixel, {1, 4096}, "Rays per pixel, for smooth edges");
-  options.choice("mode", a.mode, {"lit", "lightmap", "albedo", "normal"},
-                 "What to show: the lit scene, the light alone, the albedo, or world-space normals");
+  options.choice("mode", a.mode, shadingNames(), "What to show: " + describeShadings());
   options
       .optionalNumber("exposure", a.exposure, {-64.0f, 64.0f}, "Stops of exposure for PNG; 0 shows radiance 1 as white")
       .defaultText = "by the picture's brightness";
@@ -117,7 +116,7 @@ RenderOptions resolve(const RenderArguments& a, const Camera& camera) {
   const float aspect = camera.aspect > 0.0f ? camera.aspect : static_cast<float>(kDefaultWidth) / kDefaultHeight;
   const auto pixels = [](float v) { return std::clamp(static_cast<int>(std::lround(v)), 1, 16384); };
   RenderOptions options;
-  options.mode = a.mode;
+  options.shading = &shadings()[a.mode];
   options.samplesPerPixel = a.samplesPerPixel;
   options.width = a.width > 0 ? a.width : a.height > 0 ? pixels(static_cast<float>(a.height) * aspect) : kDefaultWidth;
   options.height = a.height > 0 ? a.height : pixels(static_cast<float>(options.width) / aspect);
@@ -142,9 +141,9 @@ Expected<void> writeStill(const RenderArguments& a, const Still& still, const st
     return writeImage(a.output, still.radiance, options);
   }
   options.format = PixelFormat::U8;
-  // Normals are no light and albedos no bright one: neither is exposed or bent by a curve.
-  if (a.mode == RenderMode::Normal) return writeImage(a.output, still.radiance, options);
-  const ToneMap curve = a.mode == RenderMode::Albedo ? ToneMap::Linear : a.toneMap;
+  const Shown shown = shadings()[a.mode].shown;
+  if (shown == Shown::Data) return writeImage(a.output, still.radiance, options);
+  const ToneMap curve = shown == Shown::Light ? a.toneMap : ToneMap::Linear;
   return writeImage(a.output, toneMap(still.radiance, exposure, curve), options);
 }
 
@@ -172,8 +171,8 @@ Expected<void> runRender(const RenderArguments& a, CommandContext& context) {
   const auto still = compositor->render(*camera, options, context.progress);
   if (!still) return still.error();
 
-  const bool light = a.mode == RenderMode::Lit || a.mode == RenderMode::Lightmap;
-  const float exposure = a.exposure ? *a.exposure : light ? autoExposure(still->radiance, still->lit) : 0.0f;
+  const bool isLight = options.shading->shown == Shown::Light;
+  const float exposure = a.exposure ? *a.exposure : isLight ? autoExposure(still->radiance, still->lit) : 0.0f;
   if (auto written = writeStill(a, *still, describe(*camera), exposure); !written) return written;
   if (context.quiet) return {};
   std::fprintf(stderr, "%s: %d x %d, camera %s", a.output.c_str(), options.width, options.height,

@@ -154,10 +154,26 @@ struct Compositor::Impl {
   Vec3 tangentNormal(const Hit& hit) const;
   Vec3 worldNormal(const Hit& hit) const;
   Vec3 light(const Hit& hit) const;
-  Vec3 shade(const Hit& hit, const Vec4& base, RenderMode mode) const;
-  Vec3 radiance(const ViewRay& ray, RenderMode mode, float& lit, Sighting* sighting) const;
+  Vec3 radiance(const ViewRay& ray, const Shading& shading, float& lit, Sighting* sighting) const;
 
+  class SeenHit;
   static void filter(const RTCFilterFunctionNArguments* arguments);
+};
+
+/// A hit as shadings see it.
+class Compositor::Impl::SeenHit : public SeenPoint {
+ public:
+  SeenHit(const Impl& impl, const Hit& hit, const Vec4& base) : impl_(impl), hit_(hit), base_(base) {}
+  bool isUnlit() const override { return hit_.shape->material->unlit; }
+  Vec3 albedo() const override { return Vec3(base_); }
+  Vec3 emission() const override { return impl_.emission(hit_); }
+  Vec3 light() const override { return impl_.light(hit_); }
+  Vec3 normal() const override { return impl_.worldNormal(hit_); }
+
+ private:
+  const Impl& impl_;
+  const Hit& hit_;
+  const Vec4 base_;
 };
 
 void Compositor::Impl::collectShapes() {
@@ -319,22 +335,7 @@ Vec3 Compositor::Impl::light(const Hit& hit) const {
   return baked.encoding->decode(std::span(values).first(maps.size()), tangentNormal(hit));
 }
 
-Vec3 Compositor::Impl::shade(const Hit& hit, const Vec4& base, RenderMode mode) const {
-  const bool unlit = hit.shape->material->unlit;
-  switch (mode) {
-    case RenderMode::Albedo:
-      return Vec3(base);
-    case RenderMode::Normal:
-      return worldNormal(hit) * 0.5f + 0.5f;
-    case RenderMode::Lightmap:
-      return unlit ? Vec3(0.0f) : light(hit);
-    case RenderMode::Lit:
-      break;
-  }
-  return unlit ? Vec3(base) : Vec3(base) * light(hit) + emission(hit);
-}
-
-Vec3 Compositor::Impl::radiance(const ViewRay& ray, RenderMode mode, float& lit, Sighting* sighting) const {
+Vec3 Compositor::Impl::radiance(const ViewRay& ray, const Shading& shading, float& lit, Sighting* sighting) const {
   constexpr int kMaxLayers = 64;
   Vec3 sum(0.0f);
   float throughput = 1.0f;
@@ -349,7 +350,7 @@ Vec3 Compositor::Impl::radiance(const ViewRay& ray, RenderMode mode, float& lit,
     hit.width = (ray.width + ray.spread * query.ray.tfar) / std::sqrt(std::max(std::abs(cosine), 1e-2f));
     const Vec4 base = baseColor(hit);
     const float alpha = hit.shape->material->alphaMode == AlphaMode::Blend ? std::clamp(base.w, 0.0f, 1.0f) : 1.0f;
-    sum += throughput * alpha * shade(hit, base, mode);
+    sum += throughput * alpha * shading.shade(SeenHit(*this, hit, base));
     if (emission(hit) == Vec3(0.0f)) lit += throughput * alpha;
     throughput *= 1.0f - alpha;
     if (sighting && !sighting->surface && alpha > 0.5f) {
@@ -360,7 +361,7 @@ Vec3 Compositor::Impl::radiance(const ViewRay& ray, RenderMode mode, float& lit,
     }
     tnear = query.ray.tfar * (1.0f + 1e-5f);
   }
-  if (throughput > 1e-3f && mode == RenderMode::Lit)
+  if (throughput > 1e-3f && shading.hasSky)
     sum += throughput * environmentRadiance(baked.scene.environment, ray.direction);
   return sum;
 }
@@ -386,7 +387,7 @@ Vec3 Compositor::boundsMax() const { return impl_->most; }
 Sighting Compositor::look(const Vec3& origin, const Vec3& direction) const {
   Sighting sighting;
   float lit = 0.0f;
-  sighting.radiance = impl_->radiance({origin, direction}, RenderMode::Lit, lit, &sighting);
+  sighting.radiance = impl_->radiance({origin, direction}, shadings().front(), lit, &sighting);
   const RTCRayHit first = impl_->trace(origin, direction, 0.0f, true);
   if (first.hit.geomID == RTC_INVALID_GEOMETRY_ID) return sighting;
   const Hit hit = impl_->hitAt(first.hit.geomID, first.hit.primID, first.hit.u, first.hit.v);
@@ -411,7 +412,7 @@ Expected<Still> Compositor::render(const Camera& camera, const RenderOptions& op
           const Vec2 offset = pixelSample(i);
           const ViewRay ray = viewRay(camera, 2.0f * (static_cast<float>(x) + offset.x) / width - 1.0f,
                                       1.0f - 2.0f * (static_cast<float>(y) + offset.y) / height, width / height, side);
-          sum += Vec3d(impl_->radiance(ray, options.mode, lit, nullptr));
+          sum += Vec3d(impl_->radiance(ray, *options.shading, lit, nullptr));
         }
         still.radiance.setRgb(x, y, Vec3(sum / static_cast<double>(options.samplesPerPixel)));
         still.lit.at(x, y)[0] = lit / static_cast<float>(options.samplesPerPixel);

@@ -1,4 +1,4 @@
-// Stills of a baked scene as a game would show it: albedo * decoded lightmap + emission, from the bake's files alone.
+// Stills of a baked scene as a game would show it, or one side of it (shading.h), from the bake's files alone.
 // Nothing here knows how the light was computed, so it is an independent check of what was written.
 #pragma once
 
@@ -7,23 +7,17 @@
 #include <vector>
 
 #include "baker/files/read/baked_scene.h"
+#include "baker/stills/shading.h"
 #include "scene/base/expected.h"
 #include "scene/base/progress.h"
 
 namespace lumel {
 
-enum class RenderMode {
-  Lit,       // albedo * light + emission
-  Lightmap,  // the light alone, as on a white surface: shows leaks and seams best
-  Albedo,
-  Normal,  // world-space normal after the normal map, n * 0.5 + 0.5
-};
-
 struct RenderOptions {
   int width = 1280;
   int height = 720;
   int samplesPerPixel = 16;
-  RenderMode mode = RenderMode::Lit;
+  const Shading* shading = &shadings().front();
 };
 
 struct Still {

@@ -178,7 +178,7 @@ class Chooser {
             axis * 2 + (seen.normal[axis] < 0.0f ? 1 : 0)};
   }
 
-  /// In nats, of counts that sum to at most `total`.
+  /// Entropy in nats of counts that sum to at most `total`.
   template <class Key>
   static double entropy(const std::map<Key, double>& counts, double total) {
     double sum = 0.0;

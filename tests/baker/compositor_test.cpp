@@ -1,6 +1,8 @@
 // Stills and the viewpoint for scenes without a camera.
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "baker/stills/viewpoint.h"
 #include "test_scene.h"
 
@@ -52,6 +54,38 @@ TEST(Compositor, FineStripesFarAwayAreGreyWithOneRay) {
   for (int x = 0; x < 32; ++x) {
     const float value = near->radiance.at(x, 7)[0];
     EXPECT_TRUE(value == 0.0f || value == 1.0f) << value;
+  }
+}
+
+TEST(Shading, EveryModeShowsWhatItsNameSays) {
+  TestScene test;
+  const Vec3 albedo(0.5f, 0.25f, 0.125f), emission(0.25f, 0.0f, 1.0f), sky(2.0f);
+  test.addRectangle({-1, -1, 0}, {2, 0, 0}, {0, 1, 0}, {.material = test.addMaterial(albedo, emission), .texels = 0});
+  test.scene.environment.color = sky;
+  const BakedScene baked = litEvenly(std::move(test));
+  const Compositor compositor = compositorOf(baked);
+  struct Expectation {
+    Vec3 below;  // where the rectangle is
+    Vec3 above;  // where nothing is
+    Shown shown;
+  };
+  const std::map<std::string, Expectation> expected = {{"lit", {albedo + emission, sky, Shown::Light}},
+                                                       {"lightmap", {Vec3(1.0f), Vec3(0.0f), Shown::Light}},
+                                                       {"albedo", {albedo, Vec3(0.0f), Shown::Color}},
+                                                       {"normal", {Vec3(0.5f, 0.5f, 1.0f), Vec3(0.0f), Shown::Data}}};
+  EXPECT_EQ(shadings().size(), expected.size());
+  for (const Shading& shading : shadings()) {
+    const auto found = expected.find(std::string(shading.name));
+    ASSERT_NE(found, expected.end()) << shading.name << " is not tested";
+    const RenderOptions options{.width = 8, .height = 8, .samplesPerPixel = 1, .shading = &shading};
+    const auto still = compositor.render(cameraLookingAt({0, 0, 2}, {0, 0, 0}, 0.5f), options, noProgress());
+    ASSERT_TRUE(still);
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_FLOAT_EQ(still->radiance.at(4, 6)[c], found->second.below[c]) << shading.name;
+      EXPECT_FLOAT_EQ(still->radiance.at(4, 1)[c], found->second.above[c]) << shading.name;
+    }
+    EXPECT_EQ(shading.shown, found->second.shown) << shading.name;
+    EXPECT_NE(describeShadings().find(shading.shows), std::string::npos);
   }
 }
 
