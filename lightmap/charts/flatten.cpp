@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "lightmap/charts/chart_rim.h"
-#include "lightmap/charts/sparse_cholesky.h"
+#include "lightmap/charts/laplacian_solver.h"
 
 namespace lumel {
 namespace {
@@ -122,7 +122,7 @@ std::vector<Vec2d> unroll(const ChartMesh& chart) {
 /// Local/global iterations: rotations per triangle, then one solve with a matrix that is factored once.
 class RigidRelaxation {
  public:
-  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), solver_(chart.points.all(), chart.triangles) {
+  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), solver_(chart.points.size(), chart.triangles) {
     factorize();
   }
 
@@ -143,14 +143,13 @@ class RigidRelaxation {
 
   /// One iteration; returns how far points moved, root mean square, or a negative number if the solve failed.
   double step(std::vector<Vec2d>& uvs) const {
-    std::vector<Vec2d> move(uvs.size(), Vec2d(0.0));  // by rank
+    std::vector<Vec2d> move(uvs.size(), Vec2d(0.0));
     for (std::size_t t = 0; t < chart_.triangles.size(); ++t) addTriangle(t, uvs, move);
     solver_.solve(move);
     double moved = 0;
     for (std::size_t i = 0; i < uvs.size(); ++i) {
-      const Vec2d by = move[solver_.rankOf(i)];
-      moved += glm::dot(by, by);
-      uvs[i] += by;
+      moved += glm::dot(move[i], move[i]);
+      uvs[i] += move[i];
     }
     return std::isfinite(moved) ? std::sqrt(moved / static_cast<double>(uvs.size())) : -1.0;
   }
@@ -205,14 +204,14 @@ class RigidRelaxation {
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec2d turned(cosine * e[k].x - sine * e[k].y, sine * e[k].x + cosine * e[k].y);
       const Vec2d missing = weight[k] * (turned - (uvs[v[(k + 1) % 3]] - uvs[v[k]]));
-      right[solver_.rankOf(v[k])] -= missing;
-      right[solver_.rankOf(v[(k + 1) % 3])] += missing;
+      right[v[k]] -= missing;
+      right[v[(k + 1) % 3]] += missing;
     }
   }
 
   const ChartMesh& chart_;
   std::vector<double> emphasis_;  // per triangle: multiplies its cotangents; empty: 1
-  SparseCholesky solver_;
+  LaplacianSolver solver_;
   bool usable_ = false;
 };
 

@@ -1,11 +1,9 @@
-#include "lightmap/charts/sparse_cholesky.h"
+#include "lightmap/charts/laplacian_solver.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
-
-#include "scene/base/parallel.h"
 
 namespace lumel {
 namespace {
@@ -46,19 +44,10 @@ struct Laplacian {
   }
 };
 
-/// Right side and solution by point.
-std::vector<Vec2d> solve(const SparseCholesky& solver, const std::vector<Vec2d>& right) {
-  std::vector<Vec2d> byRank(right.size()), byPoint(right.size());
-  for (std::size_t i = 0; i < right.size(); ++i) byRank[solver.rankOf(i)] = right[i];
-  solver.solve(byRank);
-  for (std::size_t i = 0; i < right.size(); ++i) byPoint[i] = byRank[solver.rankOf(i)];
-  return byPoint;
-}
-
-TEST(SparseCholesky, SolvesALaplacianUpToAShift) {
-  for (const std::uint32_t cells : {1u, 2u, 7u, 40u, 90u}) {  // of one front, of a few, of several tasks
+TEST(LaplacianSolver, SolvesALaplacianUpToAShift) {
+  for (const std::uint32_t cells : {1u, 2u, 7u, 40u, 90u}) {
     const Laplacian laplacian(cells);
-    SparseCholesky solver(laplacian.points, laplacian.triangles);
+    LaplacianSolver solver(laplacian.points.size(), laplacian.triangles);
     ASSERT_TRUE(solver.factorize(Laplacian::weights));
     std::vector<Vec2d> expected;
     for (const Vec3d& p : laplacian.points) expected.push_back({std::sin(p.x) + 0.1 * p.y, std::cos(0.3 * p.x * p.y)});
@@ -67,42 +56,25 @@ TEST(SparseCholesky, SolvesALaplacianUpToAShift) {
     for (int round = 0; round < 6; ++round) {  // each solves for what is missing
       std::vector<Vec2d> missing = laplacian.times(solved);
       for (std::size_t i = 0; i < missing.size(); ++i) missing[i] = right[i] - missing[i];
-      missing = solve(solver, missing);
+      solver.solve(missing);
       for (std::size_t i = 0; i < missing.size(); ++i) solved[i] += missing[i];
     }
     const Vec2d shift = solved[0] - expected[0];
     double worst = 0;
     for (std::size_t i = 0; i < solved.size(); ++i)
       worst = std::max(worst, glm::length(solved[i] - shift - expected[i]));
-    // Each round takes off what a factor of 16 bits can: two digits at the least.
+    // Each round takes off what a factor of floats can: two digits at the least.
     EXPECT_LT(worst, 1e-9) << cells;
   }
 }
 
-TEST(SparseCholesky, IsTheSameForAnyThreadCount) {
-  const Laplacian laplacian(120);
-  const auto solved = [&](int threads) {
-    const ThreadLimit limit(threads);
-    SparseCholesky solver(laplacian.points, laplacian.triangles);
-    EXPECT_TRUE(solver.factorize(Laplacian::weights));
-    std::vector<Vec2d> x(laplacian.points.size(), Vec2d(0.0));
-    x[5] = {1, 2};
-    x[7000] = {-1, -2};
-    return solve(solver, x);
-  };
-  EXPECT_EQ(solved(1), solved(4));
-}
-
-TEST(SparseCholesky, RefusesWhatDoesNotHangTogetherOrIsNotANumber) {
-  const std::vector<Vec3d> points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {5, 0, 0}, {6, 0, 0}, {5, 1, 0}};
-  const std::vector<Triangle> triangles = {{0, 1, 2}, {3, 4, 5}};
-  SparseCholesky apart(points, triangles);
-  EXPECT_FALSE(apart.factorize([](std::size_t) { return std::array<double, 3>{1, 1, 1}; }));
+TEST(LaplacianSolver, RefusesWeightsThatAreNoNumberOrGiveNoPositiveMatrix) {
   const Laplacian laplacian(4);
-  SparseCholesky solver(laplacian.points, laplacian.triangles);
+  LaplacianSolver solver(laplacian.points.size(), laplacian.triangles);
   EXPECT_FALSE(solver.factorize([](std::size_t) {
     return std::array<double, 3>{1, std::numeric_limits<double>::quiet_NaN(), 1};
   }));
+  EXPECT_FALSE(solver.factorize([](std::size_t) { return std::array<double, 3>{-1, -1, -1}; }));
   EXPECT_TRUE(solver.factorize(Laplacian::weights));  // and can be used again
 }
 
