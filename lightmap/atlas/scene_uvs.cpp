@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kUvSet = 1;
 constexpr float kRangeTolerance = 1e-5f;  // of the page: rounding of normalised 16-bit UVs
 constexpr double kOverlapShare = 0.001;
-constexpr double kOverlapTexels = 16.0;
+constexpr double kAllowedOverlapTexels = 16.0;
 constexpr double kLostSurfaceShare = 0.01;  // surface that the UVs leave without area
 
 struct Examination {
@@ -20,7 +20,7 @@ struct Examination {
 };
 
 bool tolerable(double overlapTexels, double coveredTexels) {
-  return overlapTexels <= std::max(kOverlapTexels, kOverlapShare * coveredTexels);
+  return overlapTexels <= std::max(kAllowedOverlapTexels, kOverlapShare * coveredTexels);
 }
 
 Examination examine(const Scene& scene, const Instance& instance, int pageSize) {

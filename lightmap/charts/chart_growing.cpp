@@ -10,10 +10,9 @@
 namespace lumel {
 namespace {
 
-constexpr double kThinTexels = 0.5;     // creases of triangles thinner than this fade out: no texel could show them
-constexpr double kSmoothCrease = 0.25;  // weight of a crease that is shaded smooth
-constexpr double kMostCrease = 1.2;     // however small: a little over a right angle
-constexpr double kShapeWeight = 0.002;  // against ragged borders: only decides between merges that are flat alike
+constexpr double kCreaseFadeTexels = 0.5;  // creases of thinner triangles count less: no texel could show them
+constexpr double kMostCrease = 1.2;        // however small: a little over a right angle
+constexpr double kShapeWeight = 0.002;     // against ragged borders: only decides between merges that are flat alike
 
 struct Region {
   NormalMoments normals;
@@ -143,7 +142,7 @@ class Grower {
       const Vec3d e = points_[v[(k + 1) % 3]] - points_[v[k]];
       longest2 = std::max(longest2, glm::dot(e, e));
     }
-    return std::min(1.0, glm::length(normalOf(triangle)) / std::sqrt(longest2) / kThinTexels);
+    return std::min(1.0, glm::length(normalOf(triangle)) / std::sqrt(longest2) / kCreaseFadeTexels);
   }
 
   void makeBorders() {

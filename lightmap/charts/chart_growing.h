@@ -10,6 +10,9 @@
 
 namespace lumel {
 
+/// Weight of a crease that is shaded smooth, against 1 of a hard one.
+inline constexpr double kSmoothCrease = 0.25;
+
 /// Sums over a region's triangles by which its bend is judged.
 struct NormalMoments {
   double area = 0.0;               // texels

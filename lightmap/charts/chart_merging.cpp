@@ -16,8 +16,6 @@
 namespace lumel {
 namespace {
 
-constexpr double kSmoothCrease = 0.25;    // weight of a crease that is shaded smooth
-constexpr double kRescaledTexels = 16.0;  // charts of less area are scaled to it after parts of them were squeezed
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 struct Border {
@@ -43,12 +41,6 @@ double creaseLimit(double area, double perimeter) {
   return 0.5;                  // 60 degrees
 }
 
-enum class Phase {
-  All,
-  Small,         // what is below kTinyTexels, harder: squeezed and by any edge
-  SmallTogether  // ... and what is left of that with each other, over narrower gaps between frames
-};
-
 class PartMerger {
  public:
   PartMerger(const HalfEdgeMesh& mesh, std::vector<FlatChart*> charts, const std::vector<std::uint32_t>& localTriangle,
@@ -61,12 +53,9 @@ class PartMerger {
 
   std::vector<FlatChart> run() {
     makeBorders();
-    for (const Phase phase : {Phase::All, Phase::Small, Phase::SmallTogether}) {
-      phase_ = phase;
-      const auto costOf = [this](std::uint32_t border) { return cost(border); };
-      queue_.fill(borders_, costOf);
-      queue_.run(borders_, costOf, [this](std::uint32_t border) { tryMerge(border); });
-    }
+    const auto costOf = [this](std::uint32_t border) { return cost(border); };
+    queue_.fill(borders_, costOf);
+    queue_.run(borders_, costOf, [this](std::uint32_t border) { tryMerge(border); });
     return collect();
   }
 
@@ -101,8 +90,6 @@ class PartMerger {
     const ChartSheet::Chart& a = sheet_.chart(borders_.ends(index)[0]);
     const ChartSheet::Chart& b = sheet_.chart(borders_.ends(index)[1]);
     const ChartSheet::Chart& smaller = a.normals.area < b.normals.area ? a : b;
-    if (phase_ != Phase::All && smaller.normals.area >= kTinyTexels) return kNever;
-    if (phase_ == Phase::SmallTogether && a.normals.area + b.normals.area >= kTinyTexels) return kNever;
     const double crease = border.crease / border.length;
     if (crease > creaseLimit(smaller.normals.area, smaller.perimeter)) return kNever;
     return withoutNoise(crease + 0.5 * std::max(0.0, 1 - 2 * border.length / smaller.perimeter));
@@ -111,26 +98,16 @@ class PartMerger {
   void tryMerge(std::uint32_t index) {
     Border& border = borders_[index];
     auto [into, from] = borders_.ends(index);
-    const auto size = [this](std::uint32_t c) {
-      return phase_ == Phase::All ? static_cast<double>(sheet_.chart(c).triangles.size())
-                                  : sheet_.chart(c).normals.area;
-    };
-    if (size(into) < size(from)) std::swap(into, from);
+    if (sheet_.chart(into).triangles.size() < sheet_.chart(from).triangles.size()) std::swap(into, from);
     std::vector<MeshEdge> shared;
     for (const MeshEdge edge : border.edges)
       shared.push_back(sheet_.chartOf(edge.triangle) == into ? edge : sheet_.beyond(edge));
     // A long common border first; what meets by little of it only where no flattening of both does better.
     constexpr double kMuch = 0.25, kLittle = 0.12;  // of the border: half a pipe meets the other half along one of two
     if (moveTo(border, into, from, shared, kMuch) || flattenAsOne(border, into, from, shared) ||
-        moveTo(border, into, from, shared, kLittle) || hang(into, from, shared)) {
+        moveTo(border, into, from, shared, kLittle))
       merged(into, from);
-    } else if (sheet_.chart(into).normals.area < kTinyTexels) {
-      for (MeshEdge& edge : shared) edge = sheet_.beyond(edge);
-      if (hang(from, into, shared)) merged(from, into);
-    }
   }
-
-  double frameGap() const { return phase_ == Phase::SmallTogether ? kSmallFrameGap : kFrameGap; }
 
   /// Joins the charts as they are, by a rigid motion that lets at least a share of the border meet.
   bool moveTo(const Border& border, std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared,
@@ -139,28 +116,9 @@ class PartMerger {
     for (const Joint& fit : sheet_.fits(shared, smallChartSlack(smaller))) {
       // What is too small for a chart of its own may hang on by any edge.
       if (smaller >= kTinyTexels && fit.length < leastMatch * border.length) return false;
-      if (!sheet_.mayJoin(into, from, fit, frameGap(), options_)) continue;
+      if (!sheet_.mayJoin(into, from, fit, options_)) continue;
       sheet_.join(into, from, fit);
       return true;
-    }
-    return false;
-  }
-
-  /// Hangs a small chart on by any one edge. Where it does not fit it is squeezed, as far as its stretch may go and the
-  /// density of both together stays within 2%; that of charts that are small together is set right in the end.
-  bool hang(std::uint32_t into, std::uint32_t from, const std::vector<MeshEdge>& shared) {
-    if (phase_ == Phase::All) return false;
-    constexpr double kMostLoss = 0.04;  // of the area
-    const double area = sheet_.chart(from).normals.area;
-    const double both = area + sheet_.chart(into).normals.area;
-    const double limit = options_.maxStretch * std::sqrt(smallChartSlack(area));
-    for (const double scale : {1.0, 0.7, 0.5, 0.35}) {
-      if (scale * limit < 1 || (both > kRescaledTexels && (1 - scale * scale) * area > kMostLoss * both)) break;
-      for (const Joint& fit : sheet_.hangings(shared, scale)) {
-        if (!sheet_.mayJoin(into, from, fit, frameGap(), options_)) continue;
-        sheet_.join(into, from, fit);
-        return true;
-      }
     }
     return false;
   }
@@ -176,7 +134,7 @@ class PartMerger {
     if (a.triangles.size() + b.triangles.size() > kMostTriangles) return false;
     const NormalMoments both(a.normals, b.normals);
     if (both.area < kGrowth * border.refusedArea) return false;
-    if (phase_ == Phase::All && border.length < kLeastBorder * std::min(a.perimeter, b.perimeter)) return false;
+    if (border.length < kLeastBorder * std::min(a.perimeter, b.perimeter)) return false;
     border.refusedArea = both.area;
     if (both.coneVariance() > kMostConeVariance * smallChartSlack(both.area)) return false;
     FlatChart flat;
@@ -184,7 +142,7 @@ class PartMerger {
     Flattening flattened = flatten(flat.mesh, {options_.maxStretch, options_.largestSide});
     if (!flattened.valid) return false;
     flat.uvs = std::move(flattened.uvs);
-    if (sheet_.closesBreak(into, from, flat, frameGap())) return false;
+    if (sheet_.closesBreak(into, from, flat)) return false;
     sheet_.replace(into, from, flat);
     return true;
   }
@@ -207,10 +165,8 @@ class PartMerger {
         continue;
       }
       FlatChart merged = sheet_.take(c);
-      if (sheet_.chart(c).normals.area <= kRescaledTexels) scaleToSurface(merged.mesh, merged.uvs);
       // The border test does not see everything (slivers along a border): what fails in full stays apart.
-      constexpr double kOverlapTexels = 2e-3;
-      if (!overlapsItself(merged.mesh, merged.uvs, kOverlapTexels)) {
+      if (!overlapsItself(merged.mesh, merged.uvs)) {
         result.push_back(std::move(merged));
       } else {
         for (const std::uint32_t member : members_[c]) result.push_back(std::move(*charts_[member]));
@@ -224,7 +180,6 @@ class PartMerger {
   std::vector<FlatChart*> charts_;
   ChartSheet sheet_;
   BorderGraph<Border> borders_;
-  Phase phase_ = Phase::All;
   std::vector<std::vector<std::uint32_t>> members_;  // per chart: the charts that it is made of
   BorderQueue queue_;
 };

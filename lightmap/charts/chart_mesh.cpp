@@ -109,7 +109,7 @@ Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, doubl
     const double area = flat.x1 * flat.y2;
     total += area;
     if (!(cornerArea(uv) > 0)) {
-      if (isFlipped(uv) || shortestHeight(flat) > kThinTexels) ++result.flipped;
+      if (isFlipped(uv) || shortestHeight(flat) > kNegligibleTexels) ++result.flipped;
       bad += area;
       continue;
     }
@@ -232,8 +232,7 @@ namespace {
 /// Triangles of a flattened chart in square cells, for pairs that may meet.
 class OverlapGrid {
  public:
-  OverlapGrid(const ChartMesh& chart, std::span<const Vec2d> uvs, double tolerance)
-      : chart_(chart), uvs_(uvs), tolerance_(tolerance) {
+  OverlapGrid(const ChartMesh& chart, std::span<const Vec2d> uvs) : chart_(chart), uvs_(uvs) {
     low_ = Vec2d(std::numeric_limits<double>::infinity());
     Vec2d high = -low_;
     for (const Vec2d uv : uvs) {
@@ -311,17 +310,16 @@ class OverlapGrid {
     for (std::uint32_t t = 0; t < count; ++t) visitCells(t, [&](std::size_t cell) { entries_[next[cell]++] = t; });
   }
 
-  /// Separating axes: along every edge's normal the triangles must come apart up to the tolerance.
+  /// Separating axes: along every edge's normal the triangles must come apart up to kOverlapTexels.
   bool overlap(std::uint32_t s, std::uint32_t t) const {
     const std::array<Vec2d, 3> a = corners(s);
     const std::array<Vec2d, 3> b = corners(t);
     if (!(cornerArea(a) > 0) || !(cornerArea(b) > 0)) return false;  // no area to lie on anything
-    return trianglesOverlap(a, b, tolerance_);
+    return trianglesOverlap(a, b, kOverlapTexels);
   }
 
   const ChartMesh& chart_;
   std::span<const Vec2d> uvs_;
-  double tolerance_;
   Vec2d low_;
   double cell_ = 1;
   std::size_t width_ = 1, height_ = 1;
@@ -349,8 +347,8 @@ bool packsWell(std::span<const Vec2d> uvs, double area, double largestSide) {
   return packsWell(high - low, area, largestSide);
 }
 
-bool overlapsItself(const ChartMesh& chart, std::span<const Vec2d> uvs, double tolerance) {
-  return chart.triangles.size() > 1 && OverlapGrid(chart, uvs, tolerance).anyOverlap();
+bool overlapsItself(const ChartMesh& chart, std::span<const Vec2d> uvs) {
+  return chart.triangles.size() > 1 && OverlapGrid(chart, uvs).anyOverlap();
 }
 
 }  // namespace lumel

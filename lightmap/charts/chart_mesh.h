@@ -50,7 +50,7 @@ inline FlatTriangle layFlat(const ChartMesh& chart, std::size_t triangle) {
 double shortestHeight(const FlatTriangle& triangle);
 
 /// Triangles thinner than this (texels) may stand askew or collapse: nothing of them shows.
-inline constexpr double kThinTexels = 0.01;
+inline constexpr double kNegligibleTexels = 0.01;
 
 /// Of the linear map from the surface's triangle to the texture's; `small` is not positive where that is turned over.
 struct SingularValues {
@@ -98,7 +98,7 @@ void alignToAxes(const ChartMesh& chart, std::vector<Vec2d>& uvs);
 bool packsWell(Vec2d size, double area, double largestSide);
 bool packsWell(std::span<const Vec2d> uvs, double area, double largestSide);
 
-/// Whether parts of the chart lie on each other by more than `tolerance` texels.
-bool overlapsItself(const ChartMesh& chart, std::span<const Vec2d> uvs, double tolerance);
+/// Whether parts of the chart lie on each other by more than kOverlapTexels.
+bool overlapsItself(const ChartMesh& chart, std::span<const Vec2d> uvs);
 
 }  // namespace lumel

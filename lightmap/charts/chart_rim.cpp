@@ -8,10 +8,6 @@ namespace {
 constexpr double kNearTexels = 1.5;  // a texel's diagonal, and what snapping and the search for a density may take off
 constexpr double kFarTexels = 4.0;   // on the surface: a slit of less is a detail that a lightmap blurs anyway
 
-std::uint64_t cellKey(std::int64_t x, std::int64_t y) {
-  return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32) | static_cast<std::uint32_t>(y);
-}
-
 std::int64_t cellOf(double x) { return static_cast<std::int64_t>(std::floor(x / kNearTexels)); }
 
 /// Whether any point of the edge but its last, which is another edge's first, is what `visit` looks for.

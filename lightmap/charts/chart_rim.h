@@ -8,6 +8,11 @@
 
 namespace lumel {
 
+/// Key of a cell of a grid without bounds, for hash tables.
+inline std::uint64_t cellKey(std::int64_t x, std::int64_t y) {
+  return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32) | static_cast<std::uint32_t>(y);
+}
+
 /// Points along a chart's border, a texel apart or less, with their places in the texture and on the surface (texels).
 class ChartRim {
  public:

@@ -10,14 +10,9 @@
 namespace lumel {
 namespace {
 
-constexpr double kOverlapTexels = 2e-3;
 constexpr double kMatchTexels = 0.25;  // how far welding may move a point
 constexpr double kMatchShare = 0.05;   // ... and of the edge's length
 constexpr std::size_t kSeeds = 4;      // edges that are tried as the one that matches
-
-std::uint64_t cellKey(std::int64_t x, std::int64_t y) {
-  return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32) | static_cast<std::uint32_t>(y);
-}
 
 double doubleArea(const std::array<Vec2d, 3>& t) { return cross2(t[1] - t[0], t[2] - t[0]); }
 
@@ -210,23 +205,6 @@ std::vector<Joint> ChartSheet::fits(const std::vector<MeshEdge>& shared, double 
   return found;
 }
 
-std::vector<Joint> ChartSheet::hangings(const std::vector<MeshEdge>& shared, double scale) const {
-  std::vector<Joint> found;
-  for (const MeshEdge edge : shared) {
-    const MeshEdge from = beyond(edge);
-    const std::array<Vec2d, 4> ends = {
-        uvs_[vertexAt(edge.triangle, edge.k)], uvs_[vertexAt(edge.triangle, (edge.k + 1) % 3)],
-        uvs_[vertexAt(from.triangle, (from.k + 1) % 3)], uvs_[vertexAt(from.triangle, from.k)]};
-    Joint fit{procrustes({ends}), {edge}, glm::length(ends[1] - ends[0]), scale < 1};
-    fit.motion.cosine *= scale;
-    fit.motion.sine *= scale;
-    fit.motion.shift = Vec2d(0.0);
-    fit.motion.shift = 0.5 * (ends[0] + ends[1]) - fit.motion.apply(0.5 * (ends[2] + ends[3]));
-    found.push_back(std::move(fit));
-  }
-  return found;
-}
-
 bool ChartSheet::staysGood(std::uint32_t triangle, const std::array<Vec2d, 3>& uv, double maxStretch) const {
   const auto& v = mesh_.triangles[triangle];
   // A sliver may lie turned over by less than a float UV can tell, but no further.
@@ -241,7 +219,7 @@ Vec2d ChartSheet::placeOf(std::uint32_t triangle, std::uint32_t k, const Welded&
   return place != welded.places.end() ? place->second : welded.motion.apply(uvs_[vertex]);
 }
 
-bool ChartSheet::closesBreak(std::uint32_t into, std::uint32_t from, const Welded& welded, double frameGap) const {
+bool ChartSheet::closesBreak(std::uint32_t into, std::uint32_t from, const Welded& welded) const {
   const bool fewer = charts_[from].breaks.size() < charts_[into].breaks.size();
   for (const FrameBreak& edge : charts_[fewer ? from : into].breaks) {
     const std::uint32_t a = chartOf(edge.cornerA / 3);
@@ -251,7 +229,7 @@ bool ChartSheet::closesBreak(std::uint32_t into, std::uint32_t from, const Welde
     const std::uint32_t moved = a == into ? edge.cornerB : edge.cornerA;
     const Vec2d start = uvs_[vertexAt(still / 3, still % 3)] - placeOf(moved / 3, moved % 3 + 1, welded);
     const Vec2d end = uvs_[vertexAt(still / 3, (still + 1) % 3)] - placeOf(moved / 3, moved % 3, welded);
-    if (glm::length(start) < frameGap && glm::length(end) < frameGap) return true;
+    if (glm::length(start) < kFrameGap && glm::length(end) < kFrameGap) return true;
   }
   return false;
 }
@@ -270,8 +248,7 @@ bool ChartSheet::liesOn(const Chart& target, std::uint32_t k, const std::array<V
   return hit;
 }
 
-bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Joint& fit, double frameGap,
-                         const MergeOptions& options) const {
+bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Joint& fit, const MergeOptions& options) const {
   const Chart& target = charts_[into];
   const Chart& moved = charts_[from];
   Welded welded{fit.motion, {}};
@@ -280,13 +257,13 @@ bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Joint& fi
     welded.places[vertexAt(other.triangle, other.k)] = uvs_[vertexAt(edge.triangle, (edge.k + 1) % 3)];
     welded.places[vertexAt(other.triangle, (other.k + 1) % 3)] = uvs_[vertexAt(edge.triangle, edge.k)];
   }
-  if (closesBreak(into, from, welded, frameGap)) return false;
+  if (closesBreak(into, from, welded)) return false;
   Vec2d low = target.low, high = target.high;
   const double maxStretch = options.maxStretch * std::sqrt(smallChartSlack(moved.normals.area));
   std::vector<ChartRim::Edge> rim;
   for (const std::uint32_t t : moved.triangles) {
     std::array<Vec2d, 3> uv;
-    bool changed = fit.squeezed;
+    bool changed = false;
     for (std::uint32_t k = 0; k < 3; ++k) {
       changed = changed || welded.places.contains(vertexAt(t, k));
       uv[k] = placeOf(t, k, welded);
@@ -378,10 +355,9 @@ ChartMesh ChartSheet::together(std::uint32_t a, std::uint32_t b, const std::vect
   return mesh;
 }
 
-bool ChartSheet::closesBreak(std::uint32_t a, std::uint32_t b, const FlatChart& flat, double frameGap) const {
+bool ChartSheet::closesBreak(std::uint32_t a, std::uint32_t b, const FlatChart& flat) const {
   const std::vector<FrameBreak>& breaks = charts_[charts_[a].breaks.size() < charts_[b].breaks.size() ? a : b].breaks;
-  return std::any_of(breaks.begin(), breaks.end(),
-                     [&](const FrameBreak& edge) { return isClosed(flat, edge, frameGap); });
+  return std::any_of(breaks.begin(), breaks.end(), [&](const FrameBreak& edge) { return isClosed(flat, edge); });
 }
 
 void ChartSheet::replace(std::uint32_t into, std::uint32_t from, const FlatChart& flat) {

@@ -9,7 +9,7 @@
 
 namespace lumel {
 
-/// Rotation and shift of the plane; with a scale where a small chart is squeezed (cosine^2 + sine^2 < 1).
+/// Rotation and shift of the plane.
 struct Motion {
   double cosine = 1, sine = 0;
   Vec2d shift{0.0};
@@ -28,7 +28,6 @@ struct Joint {
   Motion motion;
   std::vector<MeshEdge> matched;
   double length = 0;  // texels of `matched`
-  bool squeezed = false;
 };
 
 class ChartSheet {
@@ -56,14 +55,9 @@ class ChartSheet {
   /// fit to all of them and to single ones, the longest match first. `slack` multiplies the tolerance.
   std::vector<Joint> fits(const std::vector<MeshEdge>& shared, double slack) const;
 
-  /// For a chart that is too small to be alone: how it may hang on by each of the shared edges, squeezed towards it to
-  /// the given scale.
-  std::vector<Joint> hangings(const std::vector<MeshEdge>& shared, double scale) const;
-
   /// Whether `from`, moved and welded at the matched edges, keeps within the limits, lies on nothing of `into`, comes
-  /// near to nothing of it that is far on the surface, and leaves `frameGap` texels at breaks of the material's frame.
-  bool mayJoin(std::uint32_t into, std::uint32_t from, const Joint& fit, double frameGap,
-               const MergeOptions& options) const;
+  /// near to nothing of it that is far on the surface, and leaves kFrameGap texels at breaks of the material's frame.
+  bool mayJoin(std::uint32_t into, std::uint32_t from, const Joint& fit, const MergeOptions& options) const;
 
   void join(std::uint32_t into, std::uint32_t from, const Joint& fit);
 
@@ -71,7 +65,7 @@ class ChartSheet {
   ChartMesh together(std::uint32_t a, std::uint32_t b, const std::vector<MeshEdge>& shared) const;
 
   /// Whether a new flattening of both charts lays the sides of a break of the frame against each other.
-  bool closesBreak(std::uint32_t a, std::uint32_t b, const FlatChart& flat, double frameGap) const;
+  bool closesBreak(std::uint32_t a, std::uint32_t b, const FlatChart& flat) const;
 
   /// Replaces the two charts by `into` with a new flattening of both.
   void replace(std::uint32_t into, std::uint32_t from, const FlatChart& flat);
@@ -95,7 +89,7 @@ class ChartSheet {
   void visitCells(Vec2d a, Vec2d b, Visit visit) const;
   void addTriangles(std::uint32_t index, const FlatChart& flat);
   void insertBorder(Chart& chart, MeshEdge edge);
-  bool closesBreak(std::uint32_t into, std::uint32_t from, const Welded& welded, double frameGap) const;
+  bool closesBreak(std::uint32_t into, std::uint32_t from, const Welded& welded) const;
   bool liesOn(const Chart& target, std::uint32_t k, const std::array<Vec2d, 3>& uv) const;
   void joinBreaks(std::uint32_t into, std::uint32_t from);
   bool staysGood(std::uint32_t triangle, const std::array<Vec2d, 3>& uv, double maxStretch) const;

@@ -9,9 +9,8 @@
 namespace lumel {
 namespace {
 
-constexpr double kFlatCosine = 0.9998;   // within 1.15 degrees of the plane: projection shortens by 0.02 %
-constexpr double kOverlapTexels = 2e-3;  // parts may lie on each other by less: far below a sample's distance
-constexpr double kMaxBadShare = 0.004;   // of a chart's surface, beyond the stretch limit
+constexpr double kFlatCosine = 0.9998;  // within 1.15 degrees of the plane: projection shortens by 0.02 %
+constexpr double kMaxBadShare = 0.004;  // of a chart's surface, beyond the stretch limit
 constexpr double kMaxL2 = 1.03;
 constexpr double kSettledTexels = 0.01;  // root mean square: a relaxation that moves less has arrived
 constexpr double kSettledL2 = 1e-4;
@@ -32,7 +31,7 @@ double worstCosine(const ChartMesh& chart, Vec3d normal) {
     const auto& v = chart.triangles[t];
     const Vec3d n = glm::cross(chart.points[v[1]] - chart.points[v[0]], chart.points[v[2]] - chart.points[v[0]]);
     const double area = glm::length(n);
-    if (shortestHeight(layFlat(chart, t)) < kThinTexels) continue;
+    if (shortestHeight(layFlat(chart, t)) < kNegligibleTexels) continue;
     worst = std::min(worst, glm::dot(n, normal) / area);
   }
   return worst;
@@ -295,7 +294,7 @@ Flattening flatten(const ChartMesh& chart, const FlattenOptions& options) {
     } else if (!good) {
       good = relax(chart, result.uvs, options);
     }
-    if (!good || overlapsItself(chart, result.uvs, kOverlapTexels)) return result;
+    if (!good || overlapsItself(chart, result.uvs)) return result;
     if (!isFlat && mixesFarParts(chart, result.uvs)) return result;
   }
   alignToAxes(chart, result.uvs);

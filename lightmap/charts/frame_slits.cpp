@@ -15,7 +15,7 @@ std::int64_t find(const ChartMesh& chart, std::uint32_t meshTriangle) {
   return place != chart.meshTriangles.end() && *place == meshTriangle ? place - chart.meshTriangles.begin() : -1;
 }
 
-bool findClosed(const FlatChart& chart, const FrameBreak& edge, double gap, Slit& slit) {
+bool findClosed(const FlatChart& chart, const FrameBreak& edge, Slit& slit) {
   const std::int64_t a = find(chart.mesh, edge.cornerA / 3);
   const std::int64_t b = find(chart.mesh, edge.cornerB / 3);
   if (a < 0 || b < 0 || a == b) return false;
@@ -25,7 +25,7 @@ bool findClosed(const FlatChart& chart, const FrameBreak& edge, double gap, Slit
   };
   const Vec2d start = uv(slit.a, edge.cornerA % 3) - uv(slit.b, edge.cornerB % 3 + 1);
   const Vec2d end = uv(slit.a, edge.cornerA % 3 + 1) - uv(slit.b, edge.cornerB % 3);
-  return glm::length(start) < gap && glm::length(end) < gap;
+  return glm::length(start) < kFrameGap && glm::length(end) < kFrameGap;
 }
 
 /// The part of the chart for which keep[triangle] == which, with the UVs that it has.
@@ -61,12 +61,12 @@ FlatChart part(const FlatChart& whole, const std::vector<bool>& keep, bool which
 
 }  // namespace
 
-bool isClosed(const FlatChart& chart, const FrameBreak& edge, double gap) {
+bool isClosed(const FlatChart& chart, const FrameBreak& edge) {
   Slit unused;
-  return findClosed(chart, edge, gap, unused);
+  return findClosed(chart, edge, unused);
 }
 
-std::vector<FlatChart> splitAtFrameSlits(const HalfEdgeMesh& mesh, std::vector<FlatChart> charts, double smallGap) {
+std::vector<FlatChart> splitAtFrameSlits(const HalfEdgeMesh& mesh, std::vector<FlatChart> charts) {
   std::vector<std::uint32_t> chartOf(mesh.size(), 0);
   for (std::uint32_t c = 0; c < charts.size(); ++c)
     for (const std::uint32_t t : charts[c].mesh.meshTriangles) chartOf[t] = c;
@@ -74,8 +74,7 @@ std::vector<FlatChart> splitAtFrameSlits(const HalfEdgeMesh& mesh, std::vector<F
     const std::uint32_t c = chartOf[edge.cornerA / 3];
     Slit slit;
     if (c != chartOf[edge.cornerB / 3]) continue;
-    const double gap = surfaceArea(charts[c].mesh) < kTinyTexels ? smallGap : kFrameGap;
-    if (!findClosed(charts[c], edge, gap, slit)) continue;
+    if (!findClosed(charts[c], edge, slit)) continue;
     const std::vector<std::uint32_t> fromA = stepsFrom(charts[c].mesh, slit.a).distance;
     const std::vector<std::uint32_t> fromB = stepsFrom(charts[c].mesh, slit.b).distance;
     std::vector<bool> nearA(fromA.size());

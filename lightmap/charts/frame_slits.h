@@ -9,16 +9,13 @@ namespace lumel {
 
 /// Sides of a break that lie nearer than this (texels) are read together by one lookup.
 inline constexpr double kFrameGap = 1.0;
-/// In a chart of a few texels any lookup mixes most of the chart, whose frame turns from one side of the break to the
-/// other within that: there only sides that truly meet are kept apart, if nothing else takes them.
-inline constexpr double kSmallFrameGap = 0.05;
 
-/// Whether both sides of the break are in the chart and nearer than `gap`.
-bool isClosed(const FlatChart& chart, const FrameBreak& edge, double gap);
+/// Whether both sides of the break are in the chart and nearer than kFrameGap.
+bool isClosed(const FlatChart& chart, const FrameBreak& edge);
 
 /// An edge at which the frame breaks is a cut in its chart, but both sides may still have got the same place (a flat
 /// chart closed around it): bilinear lookup would mix two frames there. Such charts are split between the two sides;
-/// their parts keep their UVs. `smallGap`: that of charts below four texels.
-std::vector<FlatChart> splitAtFrameSlits(const HalfEdgeMesh& mesh, std::vector<FlatChart> charts, double smallGap);
+/// their parts keep their UVs.
+std::vector<FlatChart> splitAtFrameSlits(const HalfEdgeMesh& mesh, std::vector<FlatChart> charts);
 
 }  // namespace lumel

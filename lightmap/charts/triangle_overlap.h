@@ -8,6 +8,9 @@
 
 namespace lumel {
 
+/// Parts of a chart may lie on each other by less (texels): far below the distance of two samples.
+inline constexpr double kOverlapTexels = 2e-3;
+
 /// Whether a line along an edge of `a` (counter-clockwise) leaves `b` outside, an overlap of less than `tolerance`
 /// (in the units of the corners) forgiven. Zero-length edges separate nothing.
 inline bool edgeSeparates(const std::array<Vec2d, 3>& a, const std::array<Vec2d, 3>& b, double tolerance) {

@@ -134,9 +134,9 @@ Unwrapped unwrap(TriangleSoup&& soup, const UnwrapOptions& options) {
   std::vector<FlatChart> charts;
   for (std::vector<FlatChart>& region : perRegion)
     for (FlatChart& flat : region) charts.push_back(std::move(flat));
-  charts = splitAtFrameSlits(mesh, std::move(charts), kFrameGap);
+  charts = splitAtFrameSlits(mesh, std::move(charts));
   charts = mergeCharts(mesh, std::move(charts), {options.maxStretch, options.largestSide});
-  charts = splitAtFrameSlits(mesh, std::move(charts), kSmallFrameGap);
+  charts = splitAtFrameSlits(mesh, std::move(charts));
 
   Unwrapped result;
   result.degenerateTriangles = mesh.leftOut.size();
