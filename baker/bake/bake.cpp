@@ -340,7 +340,7 @@ Expected<BakeResult> bake(const LitScene& scene, const Atlas& atlas, const std::
 std::uint64_t sessionKey(const LitScene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
                          const BakeOptions& askedFor) {
   const BakeOptions options = optionsFor(scene.transport(), askedFor);
-  return GatherIntegrator(scene.transport(), kernels, atlas, texels, gatherOptionsOf(options)).key();
+  return GatherIntegrator(scene.transport(), *options.encoding, atlas, texels, gatherOptionsOf(options)).key();
 }
 
 }  // namespace lumel
