@@ -45,8 +45,8 @@ class BorderGraph {
     const auto border = static_cast<Index>(borders_.size());
     borders_.emplace_back();
     links_.push_back({{a, b}, {kNone, kNone}});
-    hang(border, 0);
-    hang(border, 1);
+    enlist(border, 0);
+    enlist(border, 1);
     insert(border);
     return border;
   }
@@ -69,7 +69,7 @@ class BorderGraph {
         grown(kept);
       } else {
         link.end[side] = into;
-        hang(border, side);
+        enlist(border, side);
         insert(border);
       }
     }
@@ -87,7 +87,7 @@ class BorderGraph {
  private:
   static constexpr Index kNone = 0xffffffffu;
 
-  /// A border hangs in the lists of both its regions. One that is gone has lost an end, and stays in the other's list.
+  /// A border is in the lists of both its regions. One that is gone has lost an end, and stays in the other's list.
   struct Link {
     std::array<Index, 2> end;
     std::array<Index, 2> next;
@@ -97,7 +97,7 @@ class BorderGraph {
     Index size = 0;
   };
 
-  void hang(Index border, std::size_t side) {
+  void enlist(Index border, std::size_t side) {
     List& list = lists_[links_[border].end[side]];
     links_[border].next[side] = list.first;
     list.first = border;

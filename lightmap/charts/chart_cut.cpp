@@ -8,31 +8,32 @@ namespace {
 
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
-/// Per point: the border loop that it is on, or kNone. A point is on one loop and on it once: else it were several.
+/// Per vertex: the border loop that it is on, or kNone. A vertex is on one loop and on it once.
 struct BorderLoops {
   std::vector<std::uint32_t> loopOf;
   std::uint32_t count = 0;
 
-  explicit BorderLoops(const ChartMesh& chart) : loopOf(chart.points.size(), kNone) {
-    std::vector<std::uint32_t> next(chart.points.size(), kNone);
-    for (std::size_t t = 0; t < chart.triangles.size(); ++t)
-      for (std::size_t k = 0; k < 3; ++k)
-        if (chart.neighbours[t][k] < 0) next[chart.triangles[t][k]] = chart.triangles[t][(k + 1) % 3];
-    for (std::uint32_t start = 0; start < next.size(); ++start) {
-      if (next[start] == kNone || loopOf[start] != kNone) continue;
-      for (std::uint32_t at = start; at != kNone && loopOf[at] == kNone; at = next[at]) loopOf[at] = count;
+  explicit BorderLoops(const ChartMesh& chart) : loopOf(chart.vertexCount(), kNone) {
+    const OpenMesh::TriConnectivity& mesh = chart.halfEdges();
+    for (const OpenMesh::VertexHandle start : mesh.vertices()) {
+      if (!mesh.is_boundary(start) || loopOf[static_cast<std::size_t>(start.idx())] != kNone) continue;
+      // A border vertex's own half-edge is the border's.
+      for (HalfedgeHandle side = mesh.halfedge_handle(start); loopOf[chart.startOf(side)] == kNone;
+           side = mesh.next_halfedge_handle(side))
+        loopOf[chart.startOf(side)] = count;
       ++count;
     }
   }
 };
 
-/// By how much each loop turns left in all, were the chart laid flat: 2 pi around a disc, -2 pi around a hole, 0 around
+/// How far each loop would turn left in all if the chart lay flat: 2 pi around a disc, -2 pi around a hole, 0 around
 /// the end of a pipe (Gauss and Bonnet).
 std::vector<double> turning(const ChartMesh& chart, const BorderLoops& loops) {
   std::vector<double> sum(loops.count, 0.0);
   for (const std::uint32_t loop : loops.loopOf)
     if (loop != kNone) sum[loop] += std::numbers::pi;
-  for (const auto& v : chart.triangles)
+  for (std::size_t t = 0; t < chart.size(); ++t) {
+    const std::array<std::uint32_t, 3> v = chart.corners(t);
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t loop = loops.loopOf[v[k]];
       if (loop == kNone) continue;
@@ -40,22 +41,13 @@ std::vector<double> turning(const ChartMesh& chart, const BorderLoops& loops) {
       const Vec3d b = chart.points[v[(k + 2) % 3]] - chart.points[v[k]];
       sum[loop] -= std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
     }
+  }
   return sum;
 }
 
 /// Points from the second border to the first along edges, by the shortest way (Dijkstra 1959).
 std::vector<std::uint32_t> shortestWay(const ChartMesh& chart, const BorderLoops& loops) {
-  const std::size_t count = chart.points.size();
-  std::vector<std::uint32_t> start(count + 1, 0);
-  for (const auto& v : chart.triangles)
-    for (const std::uint32_t i : v) start[i + 1] += 2;
-  for (std::size_t i = 0; i < count; ++i) start[i + 1] += start[i];
-  std::vector<std::uint32_t> neighbours(start.back());
-  std::vector<std::uint32_t> next(start.begin(), start.end() - 1);
-  for (const auto& v : chart.triangles)
-    for (std::size_t k = 0; k < 3; ++k)
-      for (const std::size_t other : {(k + 1) % 3, (k + 2) % 3}) neighbours[next[v[k]]++] = v[other];
-
+  const std::size_t count = chart.vertexCount();
   using Step = std::pair<double, std::uint32_t>;
   std::priority_queue<Step, std::vector<Step>, std::greater<>> queue;
   std::vector<double> distance(count, std::numeric_limits<double>::infinity());
@@ -74,8 +66,9 @@ std::vector<std::uint32_t> shortestWay(const ChartMesh& chart, const BorderLoops
       for (std::uint32_t i = at; i != kNone; i = before[i]) way.push_back(i);
       return way;
     }
-    for (std::uint32_t i = start[at]; i < start[at + 1]; ++i) {
-      const std::uint32_t to = neighbours[i];
+    for (const OpenMesh::VertexHandle vertex :
+         chart.halfEdges().vv_range(OpenMesh::VertexHandle(static_cast<int>(at)))) {
+      const auto to = static_cast<std::uint32_t>(vertex.idx());
       const double there = length + glm::length(chart.points[to] - chart.points[at]);
       if (!(there < distance[to])) continue;
       distance[to] = there;
@@ -100,15 +93,16 @@ ChartForm formOf(const ChartMesh& chart) {
 
 void cutBand(const HalfEdgeMesh& mesh, ChartMesh& chart) {
   const std::vector<std::uint32_t> way = shortestWay(chart, BorderLoops(chart));
-  std::vector<std::uint32_t> rank(chart.points.size(), kNone);
+  std::vector<std::uint32_t> rank(chart.vertexCount(), kNone);
   for (std::uint32_t i = 0; i < way.size(); ++i) rank[way[i]] = i;
-  for (std::size_t t = 0; t < chart.triangles.size(); ++t)
+  std::vector<std::int32_t> opposite = chart.opposites();
+  for (std::size_t t = 0; t < chart.size(); ++t)
     for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t a = rank[chart.triangles[t][k]];
-      const std::uint32_t b = rank[chart.triangles[t][(k + 1) % 3]];
-      if (a != kNone && b != kNone && (a + 1 == b || b + 1 == a)) chart.neighbours[t][k] = -1;
+      const std::uint32_t a = rank[chart.startOf(chart.side(t, k))];
+      const std::uint32_t b = rank[chart.endOf(chart.side(t, k))];
+      if (a != kNone && b != kNone && (a + 1 == b || b + 1 == a)) opposite[3 * t + k] = -1;
     }
-  weldCorners(mesh, chart);
+  chart = ChartMesh(mesh, std::move(chart.meshTriangles), opposite);
 }
 
 }  // namespace lumel

@@ -94,20 +94,20 @@ class Grower {
 
   /// Twice the triangle's area long.
   Vec3d normalOf(std::uint32_t triangle) const {
-    const auto& v = mesh_.triangles[triangle];
+    const std::array<std::uint32_t, 3> v = mesh_.corners(triangle);
     return glm::cross(points_[v[1]] - points_[v[0]], points_[v[2]] - points_[v[0]]);
   }
 
   double edgeLength(std::uint32_t triangle, std::size_t k) const {
-    const auto& v = mesh_.triangles[triangle];
+    const std::array<std::uint32_t, 3> v = mesh_.corners(triangle);
     return glm::length(points_[v[(k + 1) % 3]] - points_[v[k]]);
   }
 
-  /// As the border of two triangles has it.
+  /// The length that the border of two triangles holds.
   float lengthBetween(std::uint32_t t, std::uint32_t u) const {
     float length = 0;
     for (std::size_t k = 0; k < 3; ++k)
-      if (mesh_.neighbours[std::min(t, u)][k] == static_cast<std::int32_t>(std::max(t, u)))
+      if (mesh_.neighbour(std::min(t, u), k) == static_cast<std::int32_t>(std::max(t, u)))
         length += static_cast<float>(edgeLength(std::min(t, u), k));
     return length;
   }
@@ -115,7 +115,7 @@ class Grower {
   Region single(std::uint32_t triangle) const {
     Region r;
     r.normals = NormalMoments(normalOf(triangle));
-    const auto& v = mesh_.triangles[triangle];
+    const std::array<std::uint32_t, 3> v = mesh_.corners(triangle);
     r.low = Vec3(glm::min(points_[v[0]], glm::min(points_[v[1]], points_[v[2]])));
     r.high = Vec3(glm::max(points_[v[0]], glm::max(points_[v[1]], points_[v[2]])));
     for (std::size_t k = 0; k < 3; ++k) r.perimeter += edgeLength(triangle, k);
@@ -136,7 +136,7 @@ class Grower {
   }
 
   double thinness(std::uint32_t triangle) const {
-    const auto& v = mesh_.triangles[triangle];
+    const std::array<std::uint32_t, 3> v = mesh_.corners(triangle);
     double longest2 = 0;
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3d e = points_[v[(k + 1) % 3]] - points_[v[k]];
@@ -150,7 +150,7 @@ class Grower {
       const Vec3d a = normalOf(t);
       const double ownThinness = thinness(t);
       for (std::size_t k = 0; k < 3; ++k) {
-        const std::int32_t other = mesh_.neighbours[t][k];
+        const std::int32_t other = mesh_.neighbour(t, k);
         if (other <= static_cast<std::int32_t>(t)) continue;
         const auto u = static_cast<std::uint32_t>(other);
         Border& border = borders_[borders_.between(t, u)];

@@ -49,7 +49,7 @@ MergeTree growCharts(const HalfEdgeMesh& mesh, const GrowOptions& options);
 
 /// The triangle's normal, not normalised: twice its area long.
 inline Vec3d areaNormal(const HalfEdgeMesh& mesh, std::uint32_t triangle) {
-  const auto& v = mesh.triangles[triangle];
+  const std::array<std::uint32_t, 3> v = mesh.corners(triangle);
   return glm::cross(mesh.points[v[1]] - mesh.points[v[0]], mesh.points[v[2]] - mesh.points[v[0]]);
 }
 

@@ -67,12 +67,12 @@ class PartMerger {
       const ChartMesh& chart = charts_[c]->mesh;
       for (const std::uint32_t t : chart.meshTriangles)
         for (std::uint32_t k = 0; k < 3; ++k)
-          if (mesh_.neighbours[t][k] >= 0) addSide(c, {t, k});
+          if (mesh_.neighbour(t, k) >= 0) addSide(c, {t, k});
     }
   }
 
   void addSide(std::uint32_t c, MeshEdge edge) {
-    const auto other = static_cast<std::uint32_t>(mesh_.neighbours[edge.triangle][edge.k]);
+    const auto other = static_cast<std::uint32_t>(mesh_.neighbour(edge.triangle, edge.k));
     const std::uint32_t d = sheet_.chartOf(other);
     if (d <= c) return;  // a cut inside a chart, or met from the other side
     Border& border = borders_[borders_.between(c, d)];
@@ -194,7 +194,7 @@ std::vector<FlatChart> mergeCharts(const HalfEdgeMesh& mesh, std::vector<FlatCha
   std::vector<std::uint32_t> parent(charts.size());
   std::iota(parent.begin(), parent.end(), 0u);
   for (std::uint32_t t = 0; t < mesh.size(); ++t)
-    for (const std::int32_t n : mesh.neighbours[t]) {
+    for (const std::int32_t n : mesh.neighbours(t)) {
       if (n >= 0) unite(parent, chartOf[t], chartOf[static_cast<std::size_t>(n)]);
     }
   std::vector<std::vector<FlatChart*>> parts;

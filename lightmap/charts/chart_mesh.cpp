@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "lightmap/charts/triangle_overlap.h"
-#include "scene/base/union_find.h"
 
 namespace lumel {
 namespace {
@@ -17,59 +15,35 @@ double cornerArea(const std::array<Vec2d, 3>& t) { return cross2(t[1] - t[0], t[
 
 }  // namespace
 
-ChartMesh makeChartMesh(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> triangles) {
-  ChartMesh chart;
-  chart.meshTriangles = std::move(triangles);
-  const std::vector<std::uint32_t>& all = chart.meshTriangles;
-  chart.neighbours.assign(all.size(), {-1, -1, -1});
-  for (std::uint32_t t = 0; t < all.size(); ++t)
-    for (std::uint32_t k = 0; k < 3; ++k) {
-      const std::int32_t other = mesh.neighbours[all[t]][k];
-      if (other < 0) continue;
-      const auto place = std::lower_bound(all.begin(), all.end(), static_cast<std::uint32_t>(other));
-      if (place != all.end() && *place == static_cast<std::uint32_t>(other))
-        chart.neighbours[t][k] = static_cast<std::int32_t>(place - all.begin());
-    }
-  weldCorners(mesh, chart);
-  return chart;
+ChartMesh::ChartMesh(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> ofMesh,
+                     std::span<const std::int32_t> opposite)
+    : TriangleConnectivity(opposite), points{{}, mesh.points.toTexels}, meshTriangles(std::move(ofMesh)) {
+  points.positions.reserve(vertexCount());
+  for (const std::uint32_t corner : firstCorners())
+    points.positions.push_back(mesh.points.positions[mesh.corners(meshTriangles[corner / 3])[corner % 3]]);
 }
 
-void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart) {
-  const std::size_t count = chart.meshTriangles.size();
-  std::vector<std::uint32_t> corner(3 * count);
-  std::iota(corner.begin(), corner.end(), 0u);
-  for (std::uint32_t t = 0; t < count; ++t) {
-    const auto& mine = mesh.triangles[chart.meshTriangles[t]];
-    for (std::uint32_t k = 0; k < 3; ++k) {
-      if (chart.neighbours[t][k] < 0) continue;
-      const auto u = static_cast<std::uint32_t>(chart.neighbours[t][k]);
-      const auto& theirs = mesh.triangles[chart.meshTriangles[u]];
-      for (const std::uint32_t i : {k, (k + 1) % 3})
-        for (std::uint32_t j = 0; j < 3; ++j)
-          if (mine[i] == theirs[j]) unite(corner, 3 * t + i, 3 * u + j);
+ChartMesh makeChartMesh(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> triangles) {
+  std::vector<std::int32_t> opposite(3 * triangles.size(), -1);
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const HalfedgeHandle side = mesh.beyond(mesh.side(triangles[t], k));
+      if (mesh.isBorder(side)) continue;
+      const std::uint32_t other = mesh.triangleOf(side);
+      const auto place = std::lower_bound(triangles.begin(), triangles.end(), other);
+      if (place != triangles.end() && *place == other)
+        opposite[3 * t + k] = static_cast<std::int32_t>(3 * (place - triangles.begin()) + mesh.numberOf(side));
     }
-  }
-  std::vector<std::uint32_t> vertexOf(3 * count, 0);
-  chart.triangles.resize(count);
-  chart.points = {{}, mesh.points.toTexels};
-  for (std::uint32_t i = 0; i < 3 * count; ++i) {
-    const std::uint32_t root = findRoot(corner, i);
-    if (root == i) {
-      vertexOf[i] = static_cast<std::uint32_t>(chart.points.size());
-      chart.points.positions.push_back(mesh.points.positions[mesh.triangles[chart.meshTriangles[i / 3]][i % 3]]);
-    }
-    chart.triangles[i / 3][i % 3] = vertexOf[root];
-  }
-  chart.points.positions.shrink_to_fit();
+  return ChartMesh(mesh, std::move(triangles), opposite);
 }
 
 TriangleSteps stepsFrom(const ChartMesh& chart, std::uint32_t seed) {
   constexpr std::uint32_t kNotReached = 0xffffffffu;
-  TriangleSteps steps{std::vector<std::uint32_t>(chart.triangles.size(), kNotReached)};
+  TriangleSteps steps{std::vector<std::uint32_t>(chart.size(), kNotReached)};
   std::vector<std::uint32_t> queue = {seed};
   steps.distance[seed] = 0;
   for (std::size_t head = 0; head < queue.size(); ++head)
-    for (const std::int32_t n : chart.neighbours[queue[head]])
+    for (const std::int32_t n : chart.neighbours(queue[head]))
       if (n >= 0 && steps.distance[static_cast<std::size_t>(n)] == kNotReached) {
         steps.distance[static_cast<std::size_t>(n)] = steps.distance[queue[head]] + 1;
         queue.push_back(static_cast<std::uint32_t>(n));
@@ -102,9 +76,9 @@ SingularValues singularValues(const FlatTriangle& surface, const std::array<Vec2
 Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, double limit) {
   Stretch result;
   double total = 0, bad = 0, squares = 0;
-  for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
+  for (std::size_t t = 0; t < chart.size(); ++t) {
     const FlatTriangle flat = layFlat(chart, t);
-    const auto& v = chart.triangles[t];
+    const std::array<std::uint32_t, 3> v = chart.corners(t);
     const std::array<Vec2d, 3> uv = {uvs[v[0]], uvs[v[1]], uvs[v[2]]};
     const double area = flat.x1 * flat.y2;
     total += area;
@@ -124,7 +98,7 @@ Stretch measureStretch(const ChartMesh& chart, std::span<const Vec2d> uvs, doubl
 
 double surfaceArea(const ChartMesh& chart) {
   double area = 0;
-  for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
+  for (std::size_t t = 0; t < chart.size(); ++t) {
     const FlatTriangle flat = layFlat(chart, t);
     area += 0.5 * flat.x1 * flat.y2;
   }
@@ -133,9 +107,9 @@ double surfaceArea(const ChartMesh& chart) {
 
 void scaleToSurface(const ChartMesh& chart, std::vector<Vec2d>& uvs) {
   double surface = 0, texture = 0;
-  for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
+  for (std::size_t t = 0; t < chart.size(); ++t) {
     const FlatTriangle flat = layFlat(chart, t);
-    const auto& v = chart.triangles[t];
+    const std::array<std::uint32_t, 3> v = chart.corners(t);
     surface += flat.x1 * flat.y2;
     texture += std::abs(cross2(uvs[v[1]] - uvs[v[0]], uvs[v[2]] - uvs[v[0]]));
   }
@@ -196,10 +170,11 @@ Vec2d dominantDirection(const ChartMesh& chart, std::span<const Vec2d> uvs, doub
   std::array<double, kBins> longest{};
   std::array<Vec2d, kBins> direction{};
   double total = 0;
-  for (std::size_t t = 0; t < chart.triangles.size(); ++t)
+  for (std::size_t t = 0; t < chart.size(); ++t)
     for (std::size_t k = 0; k < 3; ++k) {
-      if (chart.neighbours[t][k] >= 0) continue;
-      const Vec2d edge = uvs[chart.triangles[t][(k + 1) % 3]] - uvs[chart.triangles[t][k]];
+      const HalfedgeHandle side = chart.side(t, k);
+      if (!chart.isBorder(chart.beyond(side))) continue;
+      const Vec2d edge = uvs[chart.endOf(side)] - uvs[chart.startOf(side)];
       const double size = glm::length(edge);
       if (!(size > 0)) continue;
       const double quarter = std::atan2(edge.y, edge.x) / (std::numbers::pi / 2) + 4;
@@ -241,8 +216,7 @@ class OverlapGrid {
     }
     const Vec2d size = glm::max(high - low_, Vec2d(1e-9));
     // About one triangle per cell; long thin charts still get square cells.
-    cell_ = std::max(std::sqrt(size.x * size.y / static_cast<double>(chart.triangles.size())),
-                     std::max(size.x, size.y) / 4096);
+    cell_ = std::max(std::sqrt(size.x * size.y / static_cast<double>(chart.size())), std::max(size.x, size.y) / 4096);
     width_ = static_cast<std::size_t>(size.x / cell_) + 1;
     height_ = static_cast<std::size_t>(size.y / cell_) + 1;
     fill();
@@ -259,7 +233,7 @@ class OverlapGrid {
 
  private:
   std::array<Vec2d, 3> corners(std::uint32_t t) const {
-    const auto& v = chart_.triangles[t];
+    const std::array<std::uint32_t, 3> v = chart_.corners(t);
     return {uvs_[v[0]], uvs_[v[1]], uvs_[v[2]]};
   }
 
@@ -296,11 +270,11 @@ class OverlapGrid {
   }
 
   void fill() {
-    const auto count = static_cast<std::uint32_t>(chart_.triangles.size());
+    const auto count = static_cast<std::uint32_t>(chart_.size());
     onBorder_.resize(count);
     start_.assign(width_ * height_ + 1, 0);
     for (std::uint32_t t = 0; t < count; ++t) {
-      const auto& n = chart_.neighbours[t];
+      const std::array<std::int32_t, 3> n = chart_.neighbours(t);
       onBorder_[t] = n[0] < 0 || n[1] < 0 || n[2] < 0;
       visitCells(t, [this](std::size_t cell) { ++start_[cell + 1]; });
     }
@@ -348,7 +322,7 @@ bool packsWell(std::span<const Vec2d> uvs, double area, double largestSide) {
 }
 
 bool overlapsItself(const ChartMesh& chart, std::span<const Vec2d> uvs) {
-  return chart.triangles.size() > 1 && OverlapGrid(chart, uvs).anyOverlap();
+  return chart.size() > 1 && OverlapGrid(chart, uvs).anyOverlap();
 }
 
 }  // namespace lumel

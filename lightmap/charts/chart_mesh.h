@@ -12,19 +12,17 @@
 namespace lumel {
 
 /// A connected piece of a HalfEdgeMesh. Points of the mesh where the piece merely touches itself are several vertices.
-struct ChartMesh {
-  TexelPoints points;
-  std::vector<std::array<std::uint32_t, 3>> triangles;  // into `points`
-  std::vector<std::array<std::int32_t, 3>> neighbours;  // of this chart, beyond edge (k, k + 1); -1 at its border
-  std::vector<std::uint32_t> meshTriangles;             // per triangle: of the HalfEdgeMesh, ascending
+struct ChartMesh : TriangleConnectivity {
+  TexelPoints points;                        // per vertex
+  std::vector<std::uint32_t> meshTriangles;  // per triangle: of the HalfEdgeMesh, ascending
+
+  ChartMesh() = default;
+  /// `opposite`: as for TriangleConnectivity.
+  ChartMesh(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> meshTriangles, std::span<const std::int32_t> opposite);
 };
 
 /// `triangles`: ascending, of `mesh`; connected over its neighbours.
 ChartMesh makeChartMesh(const HalfEdgeMesh& mesh, std::vector<std::uint32_t> triangles);
-
-/// Sets `triangles` and `points` from `meshTriangles` and `neighbours`: corners that meet over a joined edge are one
-/// point.
-void weldCorners(const HalfEdgeMesh& mesh, ChartMesh& chart);
 
 /// Breadth-first over joined edges from a triangle. A chart is connected: every triangle is reached.
 struct TriangleSteps {
@@ -44,7 +42,7 @@ inline FlatTriangle layFlat(const std::array<Vec3d, 3>& corners) {
   return {length, glm::dot(a, b) / length, glm::length(glm::cross(a, b)) / length};
 }
 inline FlatTriangle layFlat(const ChartMesh& chart, std::size_t triangle) {
-  const auto& v = chart.triangles[triangle];
+  const std::array<std::uint32_t, 3> v = chart.corners(triangle);
   return layFlat({chart.points[v[0]], chart.points[v[1]], chart.points[v[2]]});
 }
 double shortestHeight(const FlatTriangle& triangle);
@@ -52,7 +50,8 @@ double shortestHeight(const FlatTriangle& triangle);
 /// Triangles thinner than this (texels) may stand askew or collapse: nothing of them shows.
 inline constexpr double kNegligibleTexels = 0.01;
 
-/// Of the linear map from the surface's triangle to the texture's; `small` is not positive where that is turned over.
+/// Those of the linear map from the surface's triangle to the texture's; `small` is not positive where that is turned
+/// over.
 struct SingularValues {
   double big = 0, small = 0;
 

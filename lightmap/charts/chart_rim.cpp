@@ -50,11 +50,12 @@ bool ChartRim::mixesWith(const Edge& edge) const {
 bool mixesFarParts(const ChartMesh& chart, std::span<const Vec2d> uvs) {
   ChartRim rim;
   std::vector<ChartRim::Edge> edges;
-  for (std::size_t t = 0; t < chart.triangles.size(); ++t)
+  for (std::size_t t = 0; t < chart.size(); ++t)
     for (std::size_t k = 0; k < 3; ++k) {
-      if (chart.neighbours[t][k] >= 0) continue;
-      const std::uint32_t i = chart.triangles[t][k];
-      const std::uint32_t j = chart.triangles[t][(k + 1) % 3];
+      const HalfedgeHandle side = chart.side(t, k);
+      if (!chart.isBorder(chart.beyond(side))) continue;
+      const std::uint32_t i = chart.startOf(side);
+      const std::uint32_t j = chart.endOf(side);
       edges.push_back({uvs[i], uvs[j], chart.points[i], chart.points[j]});
     }
   for (const ChartRim::Edge& edge : edges) {

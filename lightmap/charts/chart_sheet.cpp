@@ -57,7 +57,7 @@ ChartSheet::ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& 
                        const std::vector<std::uint32_t>& localTriangle, const std::vector<FrameBreak>& breaks)
     : mesh_(mesh), localTriangle_(localTriangle) {
   std::size_t triangles = 0;
-  for (const FlatChart* flat : charts) triangles += flat->mesh.triangles.size();
+  for (const FlatChart* flat : charts) triangles += flat->mesh.size();
   chartOf_.resize(triangles);
   cornerVertex_.resize(triangles);
   joined_.resize(triangles);
@@ -67,8 +67,8 @@ ChartSheet::ChartSheet(const HalfEdgeMesh& mesh, const std::vector<FlatChart*>& 
   for (std::uint32_t c = 0; c < charts.size(); ++c) {
     addTriangles(c, *charts[c]);
     borderLength += charts_[c].perimeter;
-    for (const auto& neighbours : charts[c]->mesh.neighbours)
-      borderEdges += static_cast<std::size_t>(std::count(neighbours.begin(), neighbours.end(), -1));
+    for (const OpenMesh::EdgeHandle edge : charts[c]->mesh.halfEdges().edges())
+      borderEdges += charts[c]->mesh.halfEdges().is_boundary(edge);
   }
   constexpr double kLargestCell = 4.0;
   cell_ = std::min(kLargestCell, borderLength / static_cast<double>(std::max<std::size_t>(borderEdges, 1)));
@@ -101,14 +101,14 @@ void ChartSheet::addTriangles(std::uint32_t index, const FlatChart& flat) {
     chart.low = glm::min(chart.low, uv);
     chart.high = glm::max(chart.high, uv);
   }
-  for (std::size_t t = 0; t < flat.mesh.triangles.size(); ++t) {
+  for (std::size_t t = 0; t < flat.mesh.size(); ++t) {
     const std::uint32_t triangle = flat.mesh.meshTriangles[t];
     const std::uint32_t local = localTriangle_[triangle];
     chartOf_[local] = index;
     chart.normals = NormalMoments(chart.normals, NormalMoments(areaNormal(mesh_, triangle)));
     for (std::uint32_t k = 0; k < 3; ++k) {
-      cornerVertex_[local][k] = base + flat.mesh.triangles[t][k];
-      joined_[local][k] = flat.mesh.neighbours[t][k] >= 0;
+      cornerVertex_[local][k] = base + flat.mesh.startOf(flat.mesh.side(t, k));
+      joined_[local][k] = flat.mesh.neighbour(t, k) >= 0;
       if (!joined_[local][k]) chart.perimeter += length({triangle, k});
     }
   }
@@ -123,16 +123,12 @@ std::array<Vec2d, 3> ChartSheet::corners(std::uint32_t triangle) const {
 }
 
 MeshEdge ChartSheet::beyond(MeshEdge edge) const {
-  const auto other = static_cast<std::uint32_t>(mesh_.neighbours[edge.triangle][edge.k]);
-  const std::uint32_t end = mesh_.triangles[edge.triangle][(edge.k + 1) % 3];
-  for (std::uint32_t k = 0; k < 3; ++k)
-    if (mesh_.triangles[other][k] == end && mesh_.neighbours[other][k] == static_cast<std::int32_t>(edge.triangle))
-      return {other, k};
-  return {other, 0};
+  const HalfedgeHandle side = mesh_.beyond(mesh_.side(edge.triangle, edge.k));
+  return {mesh_.triangleOf(side), mesh_.numberOf(side)};
 }
 
 double ChartSheet::length(MeshEdge edge) const {
-  const auto& v = mesh_.triangles[edge.triangle];
+  const std::array<std::uint32_t, 3> v = mesh_.corners(edge.triangle);
   return glm::length(mesh_.points[v[(edge.k + 1) % 3]] - mesh_.points[v[edge.k]]);
 }
 
@@ -159,7 +155,7 @@ void ChartSheet::insertBorder(Chart& chart, MeshEdge edge) {
   const Vec2d a = uvs_[vertexAt(edge.triangle, edge.k)];
   const Vec2d b = uvs_[vertexAt(edge.triangle, (edge.k + 1) % 3)];
   visitCells(a, b, [&](std::uint64_t key) { chart.border[key].push_back(edge); });
-  const auto& v = mesh_.triangles[edge.triangle];
+  const std::array<std::uint32_t, 3> v = mesh_.corners(edge.triangle);
   chart.rim.add({a, b, mesh_.points[v[edge.k]], mesh_.points[v[(edge.k + 1) % 3]]});
 }
 
@@ -206,7 +202,7 @@ std::vector<Joint> ChartSheet::fits(const std::vector<MeshEdge>& shared, double 
 }
 
 bool ChartSheet::staysGood(std::uint32_t triangle, const std::array<Vec2d, 3>& uv, double maxStretch) const {
-  const auto& v = mesh_.triangles[triangle];
+  const std::array<std::uint32_t, 3> v = mesh_.corners(triangle);
   // A sliver may lie turned over by less than a float UV can tell, but no further.
   if (!(doubleArea(uv) > 0)) return !(doubleArea(corners(triangle)) > 0) && !isFlipped(uv);
   const FlatTriangle surface = layFlat({mesh_.points[v[0]], mesh_.points[v[1]], mesh_.points[v[2]]});
@@ -274,7 +270,7 @@ bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Joint& fi
     for (std::uint32_t k = 0; k < 3; ++k) {
       if (joined_[localTriangle_[t]][k]) continue;
       if (liesOn(target, k, uv)) return false;
-      const auto& v = mesh_.triangles[t];
+      const std::array<std::uint32_t, 3> v = mesh_.corners(t);
       rim.push_back({uv[k], uv[(k + 1) % 3], mesh_.points[v[k]], mesh_.points[v[(k + 1) % 3]]});
     }
   }
@@ -283,7 +279,7 @@ bool ChartSheet::mayJoin(std::uint32_t into, std::uint32_t from, const Joint& fi
                       [&target](const ChartRim::Edge& edge) { return target.rim.mixesWith(edge); });
 }
 
-/// To be called while the triangles of both charts still answer to their own.
+/// Must run while chartOf still tells the triangles of both charts apart.
 void ChartSheet::joinBreaks(std::uint32_t into, std::uint32_t from) {
   std::vector<FrameBreak> kept;
   for (const std::uint32_t chart : {into, from})
@@ -331,28 +327,17 @@ void ChartSheet::join(std::uint32_t into, std::uint32_t from, const Joint& fit) 
 }
 
 ChartMesh ChartSheet::together(std::uint32_t a, std::uint32_t b, const std::vector<MeshEdge>& shared) const {
-  ChartMesh mesh;
-  std::vector<std::uint32_t>& all = mesh.meshTriangles;
-  all = charts_[a].triangles;
+  std::vector<std::uint32_t> all = charts_[a].triangles;
   all.insert(all.end(), charts_[b].triangles.begin(), charts_[b].triangles.end());
   std::sort(all.begin(), all.end());
-  const auto indexOf = [&all](std::uint32_t triangle) {
-    return static_cast<std::uint32_t>(std::lower_bound(all.begin(), all.end(), triangle) - all.begin());
-  };
-  for (const std::uint32_t t : all) {
-    std::array<std::int32_t, 3> neighbours = {-1, -1, -1};
-    for (std::uint32_t k = 0; k < 3; ++k)
-      if (joined_[localTriangle_[t]][k])
-        neighbours[k] = static_cast<std::int32_t>(indexOf(static_cast<std::uint32_t>(mesh_.neighbours[t][k])));
-    mesh.neighbours.push_back(neighbours);
-  }
+  std::vector<std::int32_t> opposite = joinedSides(all);
   for (const MeshEdge edge : shared) {
     const MeshEdge other = beyond(edge);
-    mesh.neighbours[indexOf(edge.triangle)][edge.k] = static_cast<std::int32_t>(indexOf(other.triangle));
-    mesh.neighbours[indexOf(other.triangle)][other.k] = static_cast<std::int32_t>(indexOf(edge.triangle));
+    const std::int32_t side = sideIn(all, edge), otherSide = sideIn(all, other);
+    opposite[static_cast<std::size_t>(side)] = otherSide;
+    opposite[static_cast<std::size_t>(otherSide)] = side;
   }
-  weldCorners(mesh_, mesh);
-  return mesh;
+  return ChartMesh(mesh_, std::move(all), opposite);
 }
 
 bool ChartSheet::closesBreak(std::uint32_t a, std::uint32_t b, const FlatChart& flat) const {
@@ -372,31 +357,29 @@ void ChartSheet::replace(std::uint32_t into, std::uint32_t from, const FlatChart
 }
 
 FlatChart ChartSheet::take(std::uint32_t index) const {
+  std::vector<std::uint32_t> all = charts_[index].triangles;
+  std::sort(all.begin(), all.end());
+  const std::vector<std::int32_t> opposite = joinedSides(all);
   FlatChart flat;
-  flat.mesh.points.toTexels = mesh_.points.toTexels;
-  flat.mesh.meshTriangles = charts_[index].triangles;
-  std::sort(flat.mesh.meshTriangles.begin(), flat.mesh.meshTriangles.end());
-  std::unordered_map<std::uint32_t, std::uint32_t> vertexOf;  // looked up only
-  const std::vector<std::uint32_t>& all = flat.mesh.meshTriangles;
-  for (const std::uint32_t t : all) {
-    std::array<std::uint32_t, 3> triangle;
-    std::array<std::int32_t, 3> neighbours = {-1, -1, -1};
-    for (std::uint32_t k = 0; k < 3; ++k) {
-      const std::uint32_t vertex = vertexAt(t, k);
-      const auto [place, isNew] = vertexOf.try_emplace(vertex, static_cast<std::uint32_t>(flat.mesh.points.size()));
-      if (isNew) {
-        flat.mesh.points.positions.push_back(mesh_.points.positions[mesh_.triangles[t][k]]);
-        flat.uvs.push_back(uvs_[vertex]);
-      }
-      triangle[k] = place->second;
-      if (!joined_[localTriangle_[t]][k]) continue;
-      const auto other = std::lower_bound(all.begin(), all.end(), static_cast<std::uint32_t>(mesh_.neighbours[t][k]));
-      neighbours[k] = static_cast<std::int32_t>(other - all.begin());
-    }
-    flat.mesh.triangles.push_back(triangle);
-    flat.mesh.neighbours.push_back(neighbours);
-  }
+  flat.mesh = ChartMesh(mesh_, std::move(all), opposite);
+  for (const std::uint32_t corner : flat.mesh.firstCorners())
+    flat.uvs.push_back(uvs_[vertexAt(flat.mesh.meshTriangles[corner / 3], corner % 3)]);
   return flat;
+}
+
+/// The number of a side (3 * place + k) among ascending triangles of the mesh.
+std::int32_t ChartSheet::sideIn(const std::vector<std::uint32_t>& triangles, MeshEdge edge) {
+  const auto place = std::lower_bound(triangles.begin(), triangles.end(), edge.triangle);
+  return static_cast<std::int32_t>(3 * (place - triangles.begin()) + edge.k);
+}
+
+/// Which sides of ascending triangles of one or two charts are joined, as TriangleConnectivity takes them.
+std::vector<std::int32_t> ChartSheet::joinedSides(const std::vector<std::uint32_t>& triangles) const {
+  std::vector<std::int32_t> opposite;
+  for (const std::uint32_t t : triangles)
+    for (std::uint32_t k = 0; k < 3; ++k)
+      opposite.push_back(joined_[localTriangle_[t]][k] ? sideIn(triangles, beyond({t, k})) : -1);
+  return opposite;
 }
 
 }  // namespace lumel

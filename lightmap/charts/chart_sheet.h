@@ -91,6 +91,8 @@ class ChartSheet {
   void insertBorder(Chart& chart, MeshEdge edge);
   bool closesBreak(std::uint32_t into, std::uint32_t from, const Welded& welded) const;
   bool liesOn(const Chart& target, std::uint32_t k, const std::array<Vec2d, 3>& uv) const;
+  static std::int32_t sideIn(const std::vector<std::uint32_t>& triangles, MeshEdge edge);
+  std::vector<std::int32_t> joinedSides(const std::vector<std::uint32_t>& triangles) const;
   void joinBreaks(std::uint32_t into, std::uint32_t from);
   bool staysGood(std::uint32_t triangle, const std::array<Vec2d, 3>& uv, double maxStretch) const;
 

@@ -18,8 +18,10 @@ constexpr int kMaxIterations = 30;
 
 Vec3d chartNormal(const ChartMesh& chart) {
   Vec3d sum(0.0);
-  for (const auto& v : chart.triangles)
+  for (std::size_t t = 0; t < chart.size(); ++t) {
+    const std::array<std::uint32_t, 3> v = chart.corners(t);
     sum += glm::cross(chart.points[v[1]] - chart.points[v[0]], chart.points[v[2]] - chart.points[v[0]]);
+  }
   const double length = glm::length(sum);
   return length > 0 ? sum / length : Vec3d(0, 0, 1);
 }
@@ -27,8 +29,8 @@ Vec3d chartNormal(const ChartMesh& chart) {
 /// Smallest cosine between the plane's normal and any triangle that is not too thin to tell.
 double worstCosine(const ChartMesh& chart, Vec3d normal) {
   double worst = 1;
-  for (std::size_t t = 0; t < chart.triangles.size(); ++t) {
-    const auto& v = chart.triangles[t];
+  for (std::size_t t = 0; t < chart.size(); ++t) {
+    const std::array<std::uint32_t, 3> v = chart.corners(t);
     const Vec3d n = glm::cross(chart.points[v[1]] - chart.points[v[0]], chart.points[v[2]] - chart.points[v[0]]);
     const double area = glm::length(n);
     if (shortestHeight(layFlat(chart, t)) < kNegligibleTexels) continue;
@@ -54,16 +56,16 @@ std::vector<Vec2d> project(const ChartMesh& chart, Vec3d normal) {
 /// The triangle that is most triangles away from the border: errors of unrolling stay smallest from there.
 std::uint32_t innermostTriangle(const ChartMesh& chart) {
   std::vector<std::uint32_t> queue;
-  std::vector<bool> seen(chart.triangles.size(), false);
+  std::vector<bool> seen(chart.size(), false);
   for (std::uint32_t t = 0; t < seen.size(); ++t) {
-    const auto& n = chart.neighbours[t];
+    const std::array<std::int32_t, 3> n = chart.neighbours(t);
     if (n[0] >= 0 && n[1] >= 0 && n[2] >= 0) continue;
     seen[t] = true;
     queue.push_back(t);
   }
   if (queue.empty()) return 0;
   for (std::size_t head = 0; head < queue.size(); ++head)
-    for (const std::int32_t n : chart.neighbours[queue[head]])
+    for (const std::int32_t n : chart.neighbours(queue[head]))
       if (n >= 0 && !seen[static_cast<std::size_t>(n)]) {
         seen[static_cast<std::size_t>(n)] = true;
         queue.push_back(static_cast<std::uint32_t>(n));
@@ -76,7 +78,7 @@ std::array<Vec2d, 3> edges(const FlatTriangle& f) {
   return {Vec2d(f.x1, 0), Vec2d(f.x2 - f.x1, f.y2), Vec2d(-f.x2, -f.y2)};
 }
 
-/// As complex numbers.
+/// Products of vectors taken as complex numbers.
 Vec2d times(Vec2d a, Vec2d b) { return {a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x}; }
 Vec2d conjugate(Vec2d a) { return {a.x, -a.y}; }
 
@@ -86,30 +88,28 @@ Vec2d conjugate(Vec2d a) { return {a.x, -a.y}; }
 std::vector<Vec2d> unroll(const ChartMesh& chart) {
   std::vector<Vec2d> uvs(chart.points.size(), Vec2d(0.0));
   std::vector<std::uint8_t> placed(chart.points.size(), 0);
-  std::vector<Vec2d> turn(chart.triangles.size(), Vec2d(0.0));  // of layFlat's x axis; 0: not yet laid
+  std::vector<Vec2d> turn(chart.size(), Vec2d(0.0));  // of layFlat's x axis; 0: not yet laid
   const std::uint32_t first = innermostTriangle(chart);
   turn[first] = Vec2d(1, 0);
   const FlatTriangle flat = layFlat(chart, first);
-  uvs[chart.triangles[first][1]] = {flat.x1, 0};
-  uvs[chart.triangles[first][2]] = {flat.x2, flat.y2};
-  for (const std::uint32_t i : chart.triangles[first]) placed[i] = 1;
+  uvs[chart.corners(first)[1]] = {flat.x1, 0};
+  uvs[chart.corners(first)[2]] = {flat.x2, flat.y2};
+  for (const std::uint32_t i : chart.corners(first)) placed[i] = 1;
   std::vector<std::uint32_t> queue = {first};
   for (std::size_t head = 0; head < queue.size(); ++head) {
     const std::uint32_t t = queue[head];
     const std::array<Vec2d, 3> sides = edges(layFlat(chart, t));
     for (std::size_t k = 0; k < 3; ++k) {
-      const std::int32_t n = chart.neighbours[t][k];
-      if (n < 0 || turn[static_cast<std::size_t>(n)] != Vec2d(0.0)) continue;
-      const auto u = static_cast<std::uint32_t>(n);
+      const HalfedgeHandle side = chart.beyond(chart.side(t, k));  // the edge as the neighbour runs it
+      if (chart.isBorder(side)) continue;
+      const std::uint32_t u = chart.triangleOf(side);
+      if (turn[u] != Vec2d(0.0)) continue;
       queue.push_back(u);
-      const auto& v = chart.triangles[u];
-      const std::uint32_t from = chart.triangles[t][(k + 1) % 3];  // the edge as the neighbour runs it
-      const std::uint32_t to = chart.triangles[t][k];
-      std::size_t j = 0;
-      while (j < 2 && !(v[j] == from && v[(j + 1) % 3] == to)) ++j;
+      const std::size_t j = chart.numberOf(side);
       const std::array<Vec2d, 3> theirs = edges(layFlat(chart, u));
       turn[u] = glm::normalize(times(times(-sides[k], turn[t]), conjugate(theirs[j])));
-      const std::uint32_t apex = v[(j + 2) % 3];
+      const std::uint32_t from = chart.startOf(side);
+      const std::uint32_t apex = chart.corners(u)[(j + 2) % 3];
       if (placed[apex]) continue;
       placed[apex] = 1;
       uvs[apex] = uvs[from] - times(theirs[(j + 2) % 3], turn[u]);
@@ -121,14 +121,14 @@ std::vector<Vec2d> unroll(const ChartMesh& chart) {
 /// Local/global iterations: rotations per triangle, then one solve with a matrix that is factored once.
 class RigidRelaxation {
  public:
-  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), solver_(chart.points.size(), chart.triangles) {
+  explicit RigidRelaxation(const ChartMesh& chart) : chart_(chart), solver_(chart.vertexCount(), chart.size()) {
     factorize();
   }
 
   /// Iteratively reweighted towards a fourth power of the error: triangles beyond `limit` pull harder, so that the
   /// distortion spreads from where it is worst.
   void emphasiseWorst(const std::vector<Vec2d>& uvs, double limit) {
-    emphasis_.resize(chart_.triangles.size(), 1.0);
+    emphasis_.resize(chart_.size(), 1.0);
     for (std::size_t t = 0; t < emphasis_.size(); ++t) {
       const double excess = (worstStretch(t, uvs) - 1) / (limit - 1);
       constexpr double kLeast = 0.1, kMost = 4.0;
@@ -143,7 +143,7 @@ class RigidRelaxation {
   /// One iteration; returns how far points moved, root mean square, or a negative number if the solve failed.
   double step(std::vector<Vec2d>& uvs) const {
     std::vector<Vec2d> move(uvs.size(), Vec2d(0.0));
-    for (std::size_t t = 0; t < chart_.triangles.size(); ++t) addTriangle(t, uvs, move);
+    for (std::size_t t = 0; t < chart_.size(); ++t) addTriangle(t, uvs, move);
     solver_.solve(move);
     double moved = 0;
     for (std::size_t i = 0; i < uvs.size(); ++i) {
@@ -155,17 +155,19 @@ class RigidRelaxation {
 
  private:
   void factorize() {
-    usable_ = solver_.factorize([this](std::size_t t) { return cotangents(t, layFlat(chart_, t)); });
+    usable_ = solver_.factorize([this](std::size_t t) -> LaplacianSolver::Triangle {
+      return {chart_.corners(t), cotangents(t, layFlat(chart_, t))};
+    });
   }
 
   /// The larger of the greatest singular value and the inverse of the least; very large where turned over.
   double worstStretch(std::size_t t, const std::vector<Vec2d>& uvs) const {
-    const auto& v = chart_.triangles[t];
+    const std::array<std::uint32_t, 3> v = chart_.corners(t);
     const SingularValues s = singularValues(layFlat(chart_, t), {uvs[v[0]], uvs[v[1]], uvs[v[2]]});
     return s.small > 0 ? std::max(s.big, 1 / s.small) : 1e3;
   }
 
-  /// Of the angle opposite each edge (k, k + 1). Slivers, whose shape does not matter, are held less tightly than
+  /// The cotangent opposite each edge (k, k + 1). Slivers, whose shape does not matter, are held less tightly than
   /// theirs would have it, so that the matrix stays within what floating point can tell apart.
   std::array<double, 3> cotangents(std::size_t t, const FlatTriangle& flat) const {
     constexpr double kMost = 1e4;
@@ -186,7 +188,7 @@ class RigidRelaxation {
     const FlatTriangle flat = layFlat(chart_, t);
     const std::array<Vec2d, 3> e = edges(flat);
     const std::array<double, 3> weight = cotangents(t, flat);
-    const auto& v = chart_.triangles[t];
+    const std::array<std::uint32_t, 3> v = chart_.corners(t);
     double cosine = 0, sine = 0;  // of the rotation that fits best, not yet normalised
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec2d now = uvs[v[(k + 1) % 3]] - uvs[v[k]];
@@ -233,7 +235,7 @@ bool spreadStretch(const ChartMesh& chart, RigidRelaxation& relaxation, std::vec
   constexpr double kHopelessShare = 0.1;        // of the surface
   constexpr std::size_t kMostTriangles = 8000;  // each round is a factorization
   constexpr int kRounds = 8, kStepsPerRound = 4;
-  if (chart.triangles.size() > kMostTriangles) return false;
+  if (chart.size() > kMostTriangles) return false;
   const Stretch before = measureStretch(chart, uvs, options.maxStretch);
   if (before.flipped > 0 || before.badShare > kHopelessShare) return false;
   for (int round = 0; round < kRounds; ++round) {
@@ -271,7 +273,7 @@ bool relax(const ChartMesh& chart, std::vector<Vec2d>& uvs, const FlattenOptions
 
 Flattening flatten(const ChartMesh& chart, const FlattenOptions& options) {
   Flattening result;
-  if (chart.triangles.size() == 1) {
+  if (chart.size() == 1) {
     result.uvs = unroll(chart);
   } else {
     const Vec3d normal = chartNormal(chart);

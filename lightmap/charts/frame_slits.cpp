@@ -21,7 +21,7 @@ bool findClosed(const FlatChart& chart, const FrameBreak& edge, Slit& slit) {
   if (a < 0 || b < 0 || a == b) return false;
   slit = {static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b)};
   const auto uv = [&chart](std::uint32_t triangle, std::uint32_t k) {
-    return chart.uvs[chart.mesh.triangles[triangle][k % 3]];
+    return chart.uvs[chart.mesh.corners(triangle)[k % 3]];
   };
   const Vec2d start = uv(slit.a, edge.cornerA % 3) - uv(slit.b, edge.cornerB % 3 + 1);
   const Vec2d end = uv(slit.a, edge.cornerA % 3 + 1) - uv(slit.b, edge.cornerB % 3);
@@ -29,33 +29,26 @@ bool findClosed(const FlatChart& chart, const FrameBreak& edge, Slit& slit) {
 }
 
 /// The part of the chart for which keep[triangle] == which, with the UVs that it has.
-FlatChart part(const FlatChart& whole, const std::vector<bool>& keep, bool which) {
-  FlatChart result;
-  result.mesh.points.toTexels = whole.mesh.points.toTexels;
-  std::vector<std::int32_t> index(whole.mesh.triangles.size(), -1);
-  std::vector<std::int64_t> vertexOf(whole.uvs.size(), -1);
-  std::int32_t count = 0;
-  for (std::size_t t = 0; t < index.size(); ++t)
-    if (keep[t] == which) index[t] = count++;
-  for (std::size_t t = 0; t < index.size(); ++t) {
-    if (index[t] < 0) continue;
-    std::array<std::uint32_t, 3> triangle;
-    std::array<std::int32_t, 3> neighbours;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t old = whole.mesh.triangles[t][k];
-      if (vertexOf[old] < 0) {
-        vertexOf[old] = static_cast<std::int64_t>(result.uvs.size());
-        result.uvs.push_back(whole.uvs[old]);
-        result.mesh.points.positions.push_back(whole.mesh.points.positions[old]);
-      }
-      triangle[k] = static_cast<std::uint32_t>(vertexOf[old]);
-      const std::int32_t n = whole.mesh.neighbours[t][k];
-      neighbours[k] = n < 0 ? -1 : index[static_cast<std::size_t>(n)];
-    }
-    result.mesh.triangles.push_back(triangle);
-    result.mesh.neighbours.push_back(neighbours);
-    result.mesh.meshTriangles.push_back(whole.mesh.meshTriangles[t]);
+FlatChart part(const HalfEdgeMesh& mesh, const FlatChart& whole, const std::vector<bool>& keep, bool which) {
+  std::vector<std::uint32_t> kept, meshTriangles;  // triangles of the chart, and what they are in the mesh
+  std::vector<std::int32_t> index(keep.size(), -1);
+  for (std::uint32_t t = 0; t < keep.size(); ++t) {
+    if (keep[t] != which) continue;
+    index[t] = static_cast<std::int32_t>(kept.size());
+    kept.push_back(t);
+    meshTriangles.push_back(whole.mesh.meshTriangles[t]);
   }
+  std::vector<std::int32_t> opposite;
+  for (const std::uint32_t t : kept)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const HalfedgeHandle side = whole.mesh.beyond(whole.mesh.side(t, k));
+      const std::int32_t other = whole.mesh.isBorder(side) ? -1 : index[whole.mesh.triangleOf(side)];
+      opposite.push_back(other < 0 ? -1 : 3 * other + static_cast<std::int32_t>(whole.mesh.numberOf(side)));
+    }
+  FlatChart result;
+  result.mesh = ChartMesh(mesh, std::move(meshTriangles), opposite);
+  for (const std::uint32_t corner : result.mesh.firstCorners())
+    result.uvs.push_back(whole.uvs[whole.mesh.corners(kept[corner / 3])[corner % 3]]);
   return result;
 }
 
@@ -79,8 +72,8 @@ std::vector<FlatChart> splitAtFrameSlits(const HalfEdgeMesh& mesh, std::vector<F
     const std::vector<std::uint32_t> fromB = stepsFrom(charts[c].mesh, slit.b).distance;
     std::vector<bool> nearA(fromA.size());
     for (std::size_t t = 0; t < nearA.size(); ++t) nearA[t] = fromA[t] <= fromB[t];
-    FlatChart other = part(charts[c], nearA, false);
-    charts[c] = part(charts[c], nearA, true);
+    FlatChart other = part(mesh, charts[c], nearA, false);
+    charts[c] = part(mesh, charts[c], nearA, true);
     for (const std::uint32_t t : other.mesh.meshTriangles) chartOf[t] = static_cast<std::uint32_t>(charts.size());
     charts.push_back(std::move(other));
   }

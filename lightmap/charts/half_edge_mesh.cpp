@@ -1,10 +1,7 @@
 #include "lightmap/charts/half_edge_mesh.h"
 
-#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <algorithm>
-#include <numeric>
 
-#include "scene/base/union_find.h"
 #include "scene/triangles/triangles.h"
 
 namespace lumel {
@@ -14,14 +11,6 @@ constexpr double kDegenerateArea = 1e-12;  // of the longest edge's square: belo
 constexpr float kFrameCos = 0.9965f;       // tangents more than 4.8 degrees apart are two frames
 constexpr float kHardCos = 0.9986f;
 constexpr double kFoldCos = -0.5;  // sheets of a non-manifold edge are paired unless they fold back on each other
-
-struct MeshTraits : OpenMesh::DefaultTraits {
-  VertexAttributes(OpenMesh::Attributes::None);
-  HalfedgeAttributes(OpenMesh::Attributes::None);
-  EdgeAttributes(OpenMesh::Attributes::None);
-  FaceAttributes(OpenMesh::Attributes::None);
-};
-using OpenMeshMesh = OpenMesh::TriMesh_ArrayKernelT<MeshTraits>;
 
 struct Side {               // of an edge: one triangle's half-edge
   std::uint32_t low, high;  // welded points
@@ -40,8 +29,7 @@ class Builder {
     keepTriangles();
     pairSides();
     release(soup_.normals, soup_.frames, welded_, normals_);
-    cutIntoFans();
-    fillOpenMesh();
+    connect();
     return std::move(mesh_);
   }
 
@@ -158,107 +146,12 @@ class Builder {
   }
 
   /// Corners that are joined around a point become one vertex: points where sheets merely touch are cut apart.
-  void cutIntoFans() {
-    fan_.resize(opposite_.size());
-    std::iota(fan_.begin(), fan_.end(), 0u);
-    for (std::uint32_t corner = 0; corner < opposite_.size(); ++corner) {
-      if (opposite_[corner] < static_cast<std::int32_t>(corner)) continue;
-      const auto other = static_cast<std::uint32_t>(opposite_[corner]);
-      unite(fan_, corner, nextCorner(other));
-      unite(fan_, nextCorner(corner), other);
-    }
-  }
-
-  void fillOpenMesh() {
-    // A face that does not fit is told by add_face's result; OpenMesh would also print it.
-    [[maybe_unused]] static const bool quiet = (omerr().disable(), true);
-    OpenMeshMesh mesh;
-    const std::size_t count = opposite_.size() / 3;
-    const auto borders = static_cast<std::size_t>(std::count(opposite_.begin(), opposite_.end(), -1));
-    mesh.reserve(count / 2 + borders + 3, (3 * count + borders) / 2 + 3, count);
-    std::vector<int> vertexOfFan(fan_.size(), -1);
-    mesh_.triangles.resize(count);
-    for (std::uint32_t corner = 0; corner < fan_.size(); ++corner) {
-      int& vertex = vertexOfFan[findRoot(fan_, corner)];
-      if (vertex < 0) {
-        vertex = mesh.add_vertex({}).idx();
-        mesh_.points.positions.push_back(soup_.points.positions[vertexAt(corner)]);
-      }
-      mesh_.triangles[corner / 3][corner % 3] = static_cast<std::uint32_t>(vertex);
-    }
+  void connect() {
+    static_cast<TriangleConnectivity&>(mesh_) = TriangleConnectivity(opposite_);
+    release(opposite_);
+    for (const std::uint32_t corner : mesh_.firstCorners())
+      mesh_.points.positions.push_back(soup_.points.positions[vertexAt(corner)]);
     mesh_.points.positions.shrink_to_fit();
-    release(soup_.points.positions, soup_.indices, fan_, vertexOfFan);
-    std::vector<std::uint32_t> triangleOfFace;
-    std::vector<std::uint32_t> misfits;
-    for (const std::uint32_t t : sheetOrder()) {
-      std::array<OpenMesh::VertexHandle, 3> v;
-      for (std::size_t k = 0; k < 3; ++k) v[k] = OpenMesh::VertexHandle(static_cast<int>(mesh_.triangles[t][k]));
-      if (fits(mesh, v) && mesh.add_face(v.data(), 3).is_valid())
-        triangleOfFace.push_back(t);
-      else
-        misfits.push_back(t);
-    }
-    readNeighbours(mesh, triangleOfFace, misfits);
-  }
-
-  /// Triangles so that each one but the first of a sheet has a neighbour before it: OpenMesh links faces around a
-  /// vertex as they come, and cannot always join patches that began apart.
-  std::vector<std::uint32_t> sheetOrder() const {
-    std::vector<std::uint32_t> order;
-    std::vector<bool> seen(opposite_.size() / 3, false);
-    for (std::uint32_t start = 0; start < seen.size(); ++start) {
-      if (seen[start]) continue;
-      seen[start] = true;
-      order.push_back(start);
-      for (std::size_t head = order.size() - 1; head < order.size(); ++head)
-        for (std::uint32_t k = 0; k < 3; ++k) {
-          const std::int32_t paired = opposite_[3 * order[head] + k];
-          if (paired < 0 || seen[static_cast<std::size_t>(paired / 3)]) continue;
-          seen[static_cast<std::size_t>(paired / 3)] = true;
-          order.push_back(static_cast<std::uint32_t>(paired / 3));
-        }
-    }
-    return order;
-  }
-
-  /// Whether add_face would keep the mesh manifold.
-  static bool fits(const OpenMeshMesh& mesh, const std::array<OpenMesh::VertexHandle, 3>& v) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (v[k] == v[(k + 1) % 3] || !mesh.is_boundary(v[k])) return false;
-      const auto halfedge = mesh.find_halfedge(v[k], v[(k + 1) % 3]);
-      if (halfedge.is_valid() && !mesh.is_boundary(halfedge)) return false;
-    }
-    return true;
-  }
-
-  void readNeighbours(const OpenMeshMesh& mesh, const std::vector<std::uint32_t>& triangleOfFace,
-                      const std::vector<std::uint32_t>& misfits) {
-    mesh_.neighbours.assign(mesh_.triangles.size(), {-1, -1, -1});
-    for (std::uint32_t face = 0; face < triangleOfFace.size(); ++face) {
-      const std::uint32_t t = triangleOfFace[face];
-      for (std::uint32_t k = 0; k < 3; ++k) {
-        const std::int32_t paired = opposite_[3 * t + k];
-        if (paired < 0) continue;
-        const auto halfedge =
-            mesh.find_halfedge(OpenMesh::VertexHandle(static_cast<int>(mesh_.triangles[t][k])),
-                               OpenMesh::VertexHandle(static_cast<int>(mesh_.triangles[t][(k + 1) % 3])));
-        const auto other = mesh.face_handle(mesh.opposite_halfedge_handle(halfedge));
-        // Two fans may share both ends of an edge that is a break: only paired sides are neighbours.
-        if (other.is_valid() &&
-            triangleOfFace[static_cast<std::size_t>(other.idx())] == static_cast<std::uint32_t>(paired / 3))
-          mesh_.neighbours[t][k] = paired / 3;
-      }
-    }
-    // OpenMesh knows one edge between two vertices. A sheet that meets itself at both ends of an edge has two there;
-    // for its triangles the pairing made here stands.
-    mesh_.selfMeetingTriangles = misfits.size();
-    for (const std::uint32_t t : misfits)
-      for (std::uint32_t k = 0; k < 3; ++k)
-        if (const std::int32_t paired = opposite_[3 * t + k]; paired >= 0) {
-          mesh_.neighbours[t][k] = paired / 3;
-          mesh_.neighbours[static_cast<std::size_t>(paired / 3)][static_cast<std::size_t>(paired % 3)] =
-              static_cast<std::int32_t>(t);
-        }
   }
 
   TriangleSoup soup_;
@@ -266,7 +159,6 @@ class Builder {
   std::vector<Vec3> normals_;           // per kept triangle
   std::vector<bool> shadedFromBehind_;  // per kept triangle: all its normals point away from its front
   std::vector<std::int32_t> opposite_;  // per corner: the corner of the paired side, or -1
-  std::vector<std::uint32_t> fan_;      // per corner: union-find over corners joined around a point
   HalfEdgeMesh mesh_;
 };
 

@@ -7,18 +7,18 @@ namespace lumel {
 namespace {
 
 /// The lower triangle of the Laplacian with point 0 held.
-Eigen::SparseMatrix<float> lowerTriangle(std::size_t points, std::span<const std::array<std::uint32_t, 3>> triangles,
-                                         const LaplacianSolver::Weights& weights) {
+Eigen::SparseMatrix<float> lowerTriangle(std::size_t points, std::size_t triangles,
+                                         const LaplacianSolver::Triangles& triangle) {
   const auto size = static_cast<Eigen::Index>(points);
   std::vector<double> diagonal(points, 0.0);
   diagonal[0] = 1;
   std::vector<Eigen::Triplet<float>> entries;
-  entries.reserve(3 * triangles.size() + points);
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    const std::array<double, 3> w = weights(t);
+  entries.reserve(3 * triangles + points);
+  for (std::size_t t = 0; t < triangles; ++t) {
+    const auto [corner, w] = triangle(t);
     for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t i = triangles[t][k];
-      const std::uint32_t j = triangles[t][(k + 1) % 3];
+      const std::uint32_t i = corner[k];
+      const std::uint32_t j = corner[(k + 1) % 3];
       diagonal[i] += w[k];
       diagonal[j] += w[k];
       entries.emplace_back(static_cast<int>(std::max(i, j)), static_cast<int>(std::min(i, j)),
@@ -39,13 +39,13 @@ struct LaplacianSolver::Factor {
   bool analysed = false;
 };
 
-LaplacianSolver::LaplacianSolver(std::size_t points, std::span<const std::array<std::uint32_t, 3>> triangles)
+LaplacianSolver::LaplacianSolver(std::size_t points, std::size_t triangles)
     : points_(points), triangles_(triangles), factor_(std::make_unique<Factor>()) {}
 
 LaplacianSolver::~LaplacianSolver() = default;
 
-bool LaplacianSolver::factorize(const Weights& weights) {
-  const Eigen::SparseMatrix<float> matrix = lowerTriangle(points_, triangles_, weights);
+bool LaplacianSolver::factorize(const Triangles& triangle) {
+  const Eigen::SparseMatrix<float> matrix = lowerTriangle(points_, triangles_, triangle);
   if (!matrix.coeffs().allFinite()) return false;
   if (!factor_->analysed) factor_->llt.analyzePattern(matrix);
   factor_->analysed = true;

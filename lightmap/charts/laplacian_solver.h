@@ -17,23 +17,25 @@ namespace lumel {
 /// more solves for the residual.
 class LaplacianSolver {
  public:
-  /// Weights of triangle t's sides (k, k + 1).
-  using Weights = std::function<std::array<double, 3>(std::size_t t)>;
+  struct Triangle {
+    std::array<std::uint32_t, 3> points;
+    std::array<double, 3> weights;  // of the sides (k, k + 1)
+  };
+  using Triangles = std::function<Triangle(std::size_t t)>;
 
-  /// `triangles`: indices below `points`, connected over shared points; they must outlive the solver.
-  LaplacianSolver(std::size_t points, std::span<const std::array<std::uint32_t, 3>> triangles);
+  LaplacianSolver(std::size_t points, std::size_t triangles);
   ~LaplacianSolver();
 
-  /// False: a weight is not finite, or the matrix is not positive definite. May be called again with other weights.
-  bool factorize(const Weights& weights);
+  /// The triangles are connected over shared points; they stay the same from call to call, their weights need not.
+  /// False: a weight is not finite, or the matrix is not positive definite.
+  bool factorize(const Triangles& triangle);
 
   /// `x`: the right-hand side per point, replaced by the solution. To be called after a factorization that succeeded.
   void solve(std::span<Vec2d> x) const;
 
  private:
   struct Factor;
-  std::size_t points_;
-  std::span<const std::array<std::uint32_t, 3>> triangles_;
+  std::size_t points_, triangles_;
   std::unique_ptr<Factor> factor_;
 };
 

@@ -7,6 +7,7 @@
 #include "lightmap/charts/chart_merging.h"
 #include "lightmap/charts/flatten.h"
 #include "lightmap/charts/frame_slits.h"
+#include "lightmap/charts/half_edge_mesh.h"
 #include "scene/base/parallel.h"
 
 namespace lumel {
@@ -17,7 +18,7 @@ std::array<std::vector<std::uint32_t>, 2> halve(const ChartMesh& chart) {
   const TriangleSteps fromOne = stepsFrom(chart, stepsFrom(chart, 0).farthest);
   const TriangleSteps fromOther = stepsFrom(chart, fromOne.farthest);
   std::array<std::vector<std::uint32_t>, 2> halves;
-  for (std::uint32_t t = 0; t < chart.triangles.size(); ++t)
+  for (std::uint32_t t = 0; t < chart.size(); ++t)
     halves[fromOne.distance[t] <= fromOther.distance[t] ? 0 : 1].push_back(chart.meshTriangles[t]);
   return halves;
 }
@@ -46,7 +47,8 @@ UnwrappedChart finish(const HalfEdgeMesh& mesh, FlatChart& flat, double largestS
   UnwrappedChart chart;
   for (const Vec2d uv : aligned) chart.uvs.push_back(Vec2(uv - low));
   for (const std::uint32_t t : flat.mesh.meshTriangles) chart.triangles.push_back(mesh.sourceOf(t));
-  chart.corners = std::move(flat.mesh.triangles);
+  for (std::size_t t = 0; t < flat.mesh.size(); ++t) chart.corners.push_back(flat.mesh.corners(t));
+  flat = {};
   return chart;
 }
 
@@ -83,7 +85,7 @@ class Unwrapper {
     // many steps, so there it is halved.
     constexpr double kFairShare = 0.15;
     const auto& children = tree_.children(node);
-    const double all = static_cast<double>(chart.mesh.triangles.size());
+    const double all = static_cast<double>(chart.mesh.size());
     const double share = static_cast<double>(tree_.trianglesBelow(children[0]).size()) / all;
     if (std::min(share, 1 - share) >= kFairShare) {
       flattenBoth(charts, [&](std::size_t i, std::vector<FlatChart>& found) { flattenNode(children[i], found); });

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "lightmap/charts/half_edge_mesh.h"
+#include "lightmap/charts/triangle_soup.h"
 
 namespace lumel {
 

@@ -8,21 +8,14 @@
 namespace lumel {
 namespace {
 
-/// A mesh of points in texels, joined at edges with equal point numbers.
-HalfEdgeMesh meshOf(std::vector<Vec3> points, std::vector<std::array<std::uint32_t, 3>> triangles) {
-  HalfEdgeMesh mesh;
-  mesh.points.positions = std::move(points);
-  mesh.triangles = std::move(triangles);
-  mesh.neighbours.assign(mesh.size(), {-1, -1, -1});
-  mesh.hardEdges.assign(mesh.size(), 0);
-  for (std::uint32_t t = 0; t < mesh.size(); ++t)
-    for (std::uint32_t u = 0; u < mesh.size(); ++u)
-      for (std::size_t i = 0; i < 3; ++i)
-        for (std::size_t j = 0; j < 3; ++j)
-          if (mesh.triangles[t][i] == mesh.triangles[u][(j + 1) % 3] &&
-              mesh.triangles[t][(i + 1) % 3] == mesh.triangles[u][j])
-            mesh.neighbours[t][i] = static_cast<std::int32_t>(u);
-  return mesh;
+/// A mesh of points in texels that sets no frames.
+HalfEdgeMesh meshOf(std::vector<Vec3> points, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  TriangleSoup soup;
+  soup.normals.assign(points.size(), Vec3(0, 0, 1));
+  soup.frames.assign(points.size(), Vec4(0));
+  soup.points.positions = std::move(points);
+  for (const auto& t : triangles) soup.indices.insert(soup.indices.end(), t.begin(), t.end());
+  return buildHalfEdgeMesh(std::move(soup));
 }
 
 /// The triangles as one chart, each point where the mesh has it but for its z.
@@ -47,8 +40,8 @@ struct TwoCharts {
     std::iota(localTriangle.begin(), localTriangle.end(), 0u);
     for (const std::uint32_t t : bigTriangles)
       for (std::uint32_t k = 0; k < 3; ++k)
-        if (std::count(smallTriangles.begin(), smallTriangles.end(),
-                       static_cast<std::uint32_t>(mesh.neighbours[t][k])) > 0)
+        if (std::count(smallTriangles.begin(), smallTriangles.end(), static_cast<std::uint32_t>(mesh.neighbour(t, k))) >
+            0)
           shared.push_back({t, k});
   }
 

@@ -31,6 +31,11 @@ struct Laplacian {
     return {1 + 0.5 * std::sin(static_cast<double>(t)), 0.7, 0.2 + static_cast<double>(t % 5)};
   }
 
+  template <class Weights>
+  LaplacianSolver::Triangles withWeights(Weights weightsOf) const {
+    return [this, weightsOf](std::size_t t) -> LaplacianSolver::Triangle { return {triangles[t], weightsOf(t)}; };
+  }
+
   std::vector<Vec2d> times(const std::vector<Vec2d>& x) const {
     std::vector<Vec2d> product(x.size(), Vec2d(0.0));
     for (std::size_t t = 0; t < triangles.size(); ++t)
@@ -47,8 +52,8 @@ struct Laplacian {
 TEST(LaplacianSolver, SolvesALaplacianUpToAShift) {
   for (const std::uint32_t cells : {1u, 2u, 7u, 40u, 90u}) {
     const Laplacian laplacian(cells);
-    LaplacianSolver solver(laplacian.points.size(), laplacian.triangles);
-    ASSERT_TRUE(solver.factorize(Laplacian::weights));
+    LaplacianSolver solver(laplacian.points.size(), laplacian.triangles.size());
+    ASSERT_TRUE(solver.factorize(laplacian.withWeights(Laplacian::weights)));
     std::vector<Vec2d> expected;
     for (const Vec3d& p : laplacian.points) expected.push_back({std::sin(p.x) + 0.1 * p.y, std::cos(0.3 * p.x * p.y)});
     const std::vector<Vec2d> right = laplacian.times(expected);
@@ -70,12 +75,12 @@ TEST(LaplacianSolver, SolvesALaplacianUpToAShift) {
 
 TEST(LaplacianSolver, RefusesWeightsThatAreNoNumberOrGiveNoPositiveMatrix) {
   const Laplacian laplacian(4);
-  LaplacianSolver solver(laplacian.points.size(), laplacian.triangles);
-  EXPECT_FALSE(solver.factorize([](std::size_t) {
+  LaplacianSolver solver(laplacian.points.size(), laplacian.triangles.size());
+  EXPECT_FALSE(solver.factorize(laplacian.withWeights([](std::size_t) {
     return std::array<double, 3>{1, std::numeric_limits<double>::quiet_NaN(), 1};
-  }));
-  EXPECT_FALSE(solver.factorize([](std::size_t) { return std::array<double, 3>{-1, -1, -1}; }));
-  EXPECT_TRUE(solver.factorize(Laplacian::weights));  // and can be used again
+  })));
+  EXPECT_FALSE(solver.factorize(laplacian.withWeights([](std::size_t) { return std::array<double, 3>{-1, -1, -1}; })));
+  EXPECT_TRUE(solver.factorize(laplacian.withWeights(Laplacian::weights)));  // and can be used again
 }
 
 }  // namespace
