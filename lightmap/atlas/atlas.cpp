@@ -78,7 +78,7 @@ class AtlasBuilder {
     return {};
   }
 
-  /// Of the scene's own lightmaps, by area; 0 without any.
+  /// The density of the scene's own lightmaps, weighted by area; 0 without any.
   double meanDensity() const {
     double sum = 0, area = 0;
     for (std::size_t i = 0; i < placed_.size(); ++i) {

@@ -217,7 +217,7 @@ class Linter {
     return numbers;
   }
 
-  /// Of edges that a chart runs across: small turns may add up around a point without any edge that breaks.
+  /// Measures edges that a chart runs across: small turns may add up around a point without any edge that breaks.
   void findFrameCrossings() {
     struct Side {
       std::uint32_t low, high;                      // points

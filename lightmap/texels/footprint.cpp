@@ -98,7 +98,7 @@ Vec3 unitOr(const Vec3d& v, const Vec3& fallback) {
   return length > 1e-150 && std::isfinite(length) ? Vec3(v / length) : fallback;
 }
 
-/// By the winding in space; of a triangle without area there, by its first vertex normal.
+/// Follows the winding in space; a triangle without area there takes its first vertex normal.
 Vec3 geometricNormalOf(const Surface& surface, const std::array<std::uint32_t, 3>& v) {
   const Vec3d p0(surface.positions[v[0]]);
   const Vec3d normal = glm::cross(Vec3d(surface.positions[v[1]]) - p0, Vec3d(surface.positions[v[2]]) - p0);

@@ -247,7 +247,7 @@ TEST(DirectLight, TexturedLamp) {
 TEST(DirectLight, UniformSky) {
   Ground ground(2);
   ground.test.scene.environment.color = Vec3(1.0f);
-  const double tilted = (1 + 1 / std::sqrt(3.0)) / 2;  // 0.788675 (lightmap/README.md, "Raw")
+  const double tilted = (1 + 1 / std::sqrt(3.0)) / 2;  // 0.788675 (lightmap/maps/README.md, "Raw")
   expectAgreement(deviation(ground.test, {.samples = 256, .bounces = 0}, ground.page, [&](const Vec3d&) {
     return Maps{1, tilted, tilted, tilted};
   }));

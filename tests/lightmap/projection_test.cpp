@@ -128,7 +128,7 @@ TEST(Projection, SignedDotsKeepTheMeanButGoNegative) {
 }
 
 TEST(Projection, RmsErrors) {
-  // lightmap/README.md gives these to three digits: half a unit of the last one.
+  // lightmap/maps/README.md gives these to three digits: half a unit of the last one.
   EXPECT_NEAR(rmsError(Projection::Raw), 0.202, 0.0005);
   EXPECT_NEAR(rmsError(Projection::Flat), 0.117, 0.0005);
   EXPECT_NEAR(rmsError(Projection::Fit), 0.0929, 0.00005);
