@@ -18,10 +18,10 @@ constexpr double kBase = 145e6;
 // map from pages to texels. The warm-up before it takes less: its links are 32.
 constexpr double kSamplingPerCovered = 89.0;
 constexpr double kSamplingPerPageTexel = 0.5;
-// Finishing: places; the flat and the aux image 28, what the denoiser knows of texels and its strips 17, charts and
+// Finishing: places; the flat and the aux image 28, what the denoiser knows of texels and its strips 13, charts and
 // masks.
 constexpr double kFinishingPerCovered = 16.0;
-constexpr double kFinishingPerPageTexel = 52.0;
+constexpr double kFinishingPerPageTexel = 48.0;
 // A map of the encoding: its sums, and then its image.
 constexpr double kPerMap = 12.0;
 

@@ -15,22 +15,13 @@ namespace {
 
 constexpr int kPatch = 1;        // patches of 3 x 3 texels are compared
 constexpr int kNoiseWindow = 2;  // noise is measured over 5 x 5 texels
-/// Texels of a tile's margin: what the comparisons of its texels look at.
-constexpr int kHalo = 9;
+constexpr int kRadius = 4;       // texels up to so many away, across and along, are averaged
+/// Texels of a tile's margin: what the comparisons of its texels, and the noise of what they look at, are found by.
+constexpr int kHalo = kRadius + kPatch + kNoiseWindow + 1;
 /// Tiles that stay in a core's cache while all pairs are added, in strips that bound what is kept of changed rows.
 constexpr std::size_t kTileRows = 32;
 constexpr std::size_t kTileColumns = 256;
 constexpr std::size_t kStripRows = 4 * kTileRows;
-
-/// Texels up to `radius` steps away are averaged.
-struct Pass {
-  int radius;
-  int step;
-};
-constexpr Pass kNear{4, 1};
-constexpr Pass kFar{2, 4};  // what is left of the noise after kNear is blotches of its width
-static_assert(kNear.radius * kNear.step + kPatch + kNoiseWindow + 1 <= kHalo);
-static_assert(kFar.radius * kFar.step + kPatch <= kHalo);
 
 /// Variance of the luminance of an encoding's map over that of the flat map where there is nothing to measure it by,
 /// and what is believed of measurements: tilted maps see less evenly than the flat one.
@@ -39,8 +30,6 @@ constexpr float kLeastMapVariance = 1.5f;
 constexpr float kMostMapVariance = 8.0f;
 /// Stated variances may be too large, by so much at few samples.
 constexpr float kLeastOfStated = 0.5f;
-/// The variance of what kNear leaves is more than that of independent texels with its weights, which depend on them.
-constexpr float kRemainingVariance = 2.0f;
 /// Patches further apart than so many times their noise (as variance, beyond what noise explains) share nothing.
 constexpr float kLargestDistance = 6.0f;
 /// What a texel counts without its opposite, at a distance of one texel; it falls with the square of the distance, as
@@ -98,7 +87,6 @@ struct Judged {
   std::span<const CoarseNormal> normals;
   std::span<const float> errors;
   std::size_t stride;
-  std::span<const float> remaining;  // share of the variance that is left; empty before anything is averaged
 };
 
 Tile readTile(const Rows& from, const Judged& judged, std::ptrdiff_t firstRow, std::size_t rows,
@@ -138,7 +126,7 @@ Tile readTile(const Rows& from, const Judged& judged, std::ptrdiff_t firstRow, s
       }
       const float light = tile.luminances[0][to];
       const float error = std::max(std::min(judged.errors[source * judged.stride], light), kLeastRelativeError * light);
-      tile.variance[to] += error * error * (judged.remaining.empty() ? 1.0f : judged.remaining[source]);
+      tile.variance[to] += error * error;
     }
   }
   return tile;
@@ -322,7 +310,6 @@ Agreements::Agreements(const Tile& tile, int dx, int dy)
 /// Weighted sums of a tile's texels.
 struct Sums {
   std::vector<float> weight;
-  std::vector<float> squaredWeight;
   std::vector<std::vector<float>> colors;
 };
 
@@ -346,7 +333,6 @@ LUMEL_FOR_EACH_CPU void addPair(const Tile& tile, int dx, int dy, Sums& sums) {
       aheads[x] = both + unpaired * (ahead[x] - both);
       behinds[x] = both + unpaired * (behind[x] - both);
       sums.weight[to + x] += aheads[x] + behinds[x];
-      sums.squaredWeight[to + x] += aheads[x] * aheads[x] + behinds[x] * behinds[x];
     }
     const auto here = static_cast<std::ptrdiff_t>(tile.at(static_cast<std::ptrdiff_t>(row), 0));
     for (std::size_t c = 0; c < tile.colors.size(); ++c) {
@@ -362,7 +348,7 @@ LUMEL_FOR_EACH_CPU void addPair(const Tile& tile, int dx, int dy, Sums& sums) {
   }
 }
 
-Sums averageTile(const Tile& tile, const Pass& pass) {
+Sums averageTile(const Tile& tile) {
   Sums sums;
   const std::size_t width = tile.columns;
   const std::size_t count = width * tile.rows;
@@ -376,19 +362,16 @@ Sums averageTile(const Tile& tile, const Pass& pass) {
       for (std::size_t c = 0; c < tile.colors.size(); ++c) sums.colors[c][row * width + x] = tile.colors[c][here + x];
     }
   }
-  sums.squaredWeight = sums.weight;
-  for (int dy = 0; dy <= pass.radius; ++dy)
-    for (int dx = dy == 0 ? 1 : -pass.radius; dx <= pass.radius; ++dx)
-      addPair(tile, dx * pass.step, dy * pass.step, sums);
+  for (int dy = 0; dy <= kRadius; ++dy)
+    for (int dx = dy == 0 ? 1 : -kRadius; dx <= kRadius; ++dx) addPair(tile, dx, dy, sums);
   return sums;
 }
 
-/// Where averages go: a strip of the page, and what share of their variance is left to the whole page, if asked for.
+/// A strip of the page, which averages are stored to.
 struct Averages {
   std::size_t width;
   std::size_t firstRow;  // of the strip
   std::vector<std::vector<float>> strip;
-  std::span<float> remaining;
 };
 
 /// (row, column): of the tile on the page.
@@ -401,19 +384,16 @@ void storeTile(const Tile& tile, const Sums& sums, std::size_t row, std::size_t 
       const std::size_t pixel = 3 * (texel - to.firstRow * to.width);
       for (std::size_t c = 0; c < sums.colors.size(); ++c)
         to.strip[c / 3][pixel + c % 3] = sums.colors[c][i] / sums.weight[i];
-      if (!to.remaining.empty())
-        to.remaining[texel] =
-            std::min(kRemainingVariance * sums.squaredWeight[i] / (sums.weight[i] * sums.weight[i]), 1.0f);
     }
 }
 
-/// Averages the texels of a page. `remaining`: one entry per texel, or empty.
-void averagePage(std::span<Image* const> maps, const Judged& judged, const Pass& pass, std::span<float> remaining) {
+/// Averages the texels of a page.
+void averagePage(std::span<Image* const> maps, const Judged& judged) {
   const auto width = static_cast<std::size_t>(maps[0]->width);
   const auto height = static_cast<std::size_t>(maps[0]->height);
   const std::size_t tilesPerRow = (width + kTileColumns - 1) / kTileColumns;
   Rows before{maps, {}};
-  Averages to{width, 0, std::vector<std::vector<float>>(maps.size()), remaining};
+  Averages to{width, 0, std::vector<std::vector<float>>(maps.size())};
   for (std::size_t first = 0; first < height; first += kStripRows) {
     const std::size_t last = std::min(height, first + kStripRows);
     to.firstRow = first;
@@ -428,8 +408,8 @@ void averagePage(std::span<Image* const> maps, const Judged& judged, const Pass&
         const std::size_t column = t % tilesPerRow * kTileColumns;
         Tile tile = readTile(before, judged, static_cast<std::ptrdiff_t>(row), std::min(kTileRows, last - row),
                              static_cast<std::ptrdiff_t>(column), std::min(kTileColumns, width - column));
-        if (judged.remaining.empty()) measureNoise(tile);
-        storeTile(tile, averageTile(tile, pass), row, column, to);
+        measureNoise(tile);
+        storeTile(tile, averageTile(tile), row, column, to);
       }
     });
     if (last < height) before.keepBefore(static_cast<std::ptrdiff_t>(last));
@@ -481,9 +461,7 @@ void denoise(Image& flat, std::span<Image> encoded, std::span<const std::uint32_
     LUMEL_CHECK(map->width == flat.width && map->height == flat.height && map->channels == 3);
   if (chartIds.empty()) return;
   const std::vector<double> light = lightOfCharts(flat, chartIds);
-  std::vector<float> remaining(count, 1.0f);
-  averagePage(maps, {chartIds, normals, standardError, stride, {}}, kNear, remaining);
-  averagePage(maps, {chartIds, normals, standardError, stride, remaining}, kFar, {});
+  averagePage(maps, {chartIds, normals, standardError, stride});
   restoreLight(maps, chartIds, light);
 }
 

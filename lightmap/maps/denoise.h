@@ -21,7 +21,7 @@ inline constexpr float kCoarseNormal = 127.0f;
 /// holds for them linearly (the mean of three RNM maps is the flat one) goes on to hold. A texel without noise keeps
 /// its value among texels that differ from it, but for one factor to all texels and maps of a chart, by which the chart
 /// keeps its flat map's mean luminance. Values that are not finite spread no further than the texel. Parallel and
-/// deterministic. Memory: 4 bytes per texel and 6.5 KiB per texel of the page's width.
+/// deterministic. Memory: 6.5 KiB per texel of the page's width.
 void denoise(Image& flat, std::span<Image> encoded, std::span<const std::uint32_t> chartIds,
              std::span<const CoarseNormal> normals, std::span<const float> standardError, std::size_t stride = 1);
 

@@ -133,15 +133,6 @@ TEST(Denoise, AShadowsEdgeStaysWhereItIs) {
   }
 }
 
-// What one pass over nearby texels leaves is uneven over distances that it does not see.
-TEST(Denoise, BlotchesGo) {
-  const auto truth = [](int, int) { return 1.0f; };
-  Page page(truth, 0.1f);
-  page.denoise();
-  // The means of 81 texels have errors of 0.1 / 9 = 0.011.
-  EXPECT_LT(rmsError(page.flat, truth), 0.009);
-}
-
 // Light that comes in at a low angle is in the tilted maps, and so is its noise.
 TEST(Denoise, RnmMapsAreJudgedByTheirOwnNoise) {
   const auto truth = [](int, int) { return 1.0f; };
