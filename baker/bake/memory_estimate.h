@@ -21,8 +21,8 @@ struct BakeSize {
 /// at 0.
 BakeSize sceneSize(const Scene& scene);
 
-/// Peak resident memory of `lumel bake` in bytes, the program and its libraries included. README has the model and how
-/// far it was off for real scenes.
+/// Peak resident memory of `lumel bake` in bytes, the program and its libraries included. baker/bake/README.md
+/// has the model, tests/bench/README.md how far it was off for real scenes.
 double bakeMemory(const BakeSize& size);
 
 }  // namespace lumel

@@ -1,5 +1,5 @@
 // The lobes around which visibility is gathered, and their integrals over one azimuth slice in closed form.
-// Derivation in ssbump/README.md.
+// Derivation in ssbump/occlusion/README.md.
 #pragma once
 
 #include <span>

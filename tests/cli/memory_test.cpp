@@ -33,7 +33,7 @@ Bake bakeOf(const std::filesystem::path& scene, const std::string& pageSize) {
 }
 
 // The libraries' share, 145 MB where it was measured, is half of the peaks here and differs between systems; real
-// scenes were told within -1.5 and +19% (baker/README.md).
+// scenes were told within -1.5 and +19% (tests/bench/README.md).
 constexpr double kLeast = 0.75;
 constexpr double kMost = 1.1;
 
