@@ -38,7 +38,7 @@ struct Mesh {
   std::vector<Primitive> primitives;
 };
 
-/// From glTF extras.lumel of the node (or its mesh): {"scale": 2.0, "casts": false, "receives": false}.
+/// Holds what extras.lumel of a glTF node (or its mesh) says: {"scale": 2.0, "casts": false, "receives": false}.
 struct ObjectSettings {
   float texelDensityScale = 1.0f;  // multiplies the bake's texels per metre; > 0
   bool casts = true;               // blocks and bounces light for others
@@ -55,7 +55,7 @@ struct Instance {
 
 enum class Wrap { Repeat, Mirror, Clamp };
 
-/// Where and how a material reads an image. uv' = uvMatrix * (u, v, 1) (KHR_texture_transform).
+/// Tells where and how a material reads an image. uv' = uvMatrix * (u, v, 1) (KHR_texture_transform).
 struct TextureRef {
   int image = -1;  // into Scene::images; -1 = none
   int uvSet = 0;
@@ -98,7 +98,7 @@ struct ImageSource {
 
 enum class LightType { Point, Spot, Directional };
 
-/// As KHR_lights_punctual calls it: "point", "spot", "directional".
+/// Returns the name that KHR_lights_punctual gives a type: "point", "spot", "directional".
 inline const char* nameOf(LightType type) {
   return type == LightType::Point ? "point" : type == LightType::Spot ? "spot" : "directional";
 }

@@ -111,7 +111,7 @@ std::vector<Vec3> lights() {
 }
 
 double degreesBetween(const Vec3& a, const Vec3& b) {
-  // By the chord: exact for small angles, where the arc cosine is not.
+  // The chord tells small angles exactly, which the arc cosine does not.
   return 2 * std::asin(std::min(1.0, 0.5 * static_cast<double>(glm::length(a - b)))) * 180 / std::numbers::pi;
 }
 

@@ -76,7 +76,7 @@ class OptionTable {
   }
 
   Option* find(const std::string& name);
-  /// Of a declared option.
+  /// Tells whether a declared option was given.
   bool isGiven(const std::string& name) const { return const_cast<OptionTable*>(this)->find(name)->isGiven; }
   std::deque<Option>& all() { return options_; }
   const std::deque<Option>& all() const { return options_; }

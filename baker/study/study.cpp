@@ -21,7 +21,7 @@ namespace {
 
 /// Candidates have options.seed; these are far from any that people choose.
 constexpr std::uint64_t kReferenceSeed = 0x9e3779b97f4a7c15ull;
-/// Where charts do not fit the page at any density, larger pages are tried up to this.
+/// Larger pages are tried up to this where charts do not fit the page at any density.
 constexpr int kMostPage = 4096;
 constexpr std::array<int, 2> kPilotSamples = {4, 16};
 constexpr int kLeastReference = 64;
@@ -384,7 +384,7 @@ Expected<void> Studying::makeAtlas() {
   return {};
 }
 
-/// By series, in the order of the tables; within one as they were measured.
+/// Sorts the points by series, in the order of the tables; within one they stay as they were measured.
 void Studying::sortPoints() {
   const auto rank = [](const StudyPoint& p) {
     constexpr std::array<std::string_view, 5> kOrder = {"gather", "denoised", "path", "projection", "density"};

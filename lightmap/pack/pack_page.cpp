@@ -19,8 +19,9 @@ constexpr std::size_t kMostVariants = 128;
 /// Fuller pages than this are beyond any order.
 constexpr double kHopeless = 0.985;
 
-/// A shape with at least this share of all room is moved in the order and given a stance; the rest are gravel.
-constexpr double kBoulder = 0.002;
+/// Variants move a shape with at least this share of all room in the order and give it an aspect; smaller ones fill the
+/// gaps in any order.
+constexpr double kReorderedShare = 0.002;
 
 std::uint64_t mixed(std::uint64_t a, std::uint64_t b) {
   std::uint64_t h = a * 0x9e3779b97f4a7c15u + b;
@@ -31,35 +32,35 @@ std::uint64_t mixed(std::uint64_t a, std::uint64_t b) {
   return h ^ (h >> 31);
 }
 
-bool hasStance(const SearchMask& mask, Stance stance) {
-  return stance == Stance::Any || (stance == Stance::Wide ? mask.width >= mask.height : mask.height >= mask.width);
+bool hasAspect(const SearchMask& mask, Aspect aspect) {
+  return aspect == Aspect::Any || (aspect == Aspect::Wide ? mask.width >= mask.height : mask.height >= mask.width);
 }
 
 struct Step {
   std::uint32_t shape = 0;
-  Stance stance = Stance::Any;
+  Aspect aspect = Aspect::Any;
 };
 
-/// The order and stances of variant `variant`; 0 is the plain one. Shapes of equal size are treated alike, so that
+/// The order and aspects of variant `variant`; 0 is the plain one. Shapes of equal size are treated alike, so that
 /// they can form rows.
 std::vector<Step> stepsOf(std::span<const GridShape> shapes, const std::vector<std::uint32_t>& bySize,
                           std::size_t totalRoom, std::size_t variant) {
   std::vector<Step> steps;
   steps.reserve(bySize.size());
-  for (const std::uint32_t i : bySize) steps.push_back({i, Stance::Any});
+  for (const std::uint32_t i : bySize) steps.push_back({i, Aspect::Any});
   if (variant == 0) return steps;
   std::vector<double> rank(shapes.size(), 0.0);
   for (std::size_t k = 0; k < steps.size(); ++k) {
     const GridShape& shape = shapes[steps[k].shape];
     rank[steps[k].shape] = -static_cast<double>(k);
-    if (static_cast<double>(shape.room) < kBoulder * static_cast<double>(totalRoom)) continue;
+    if (static_cast<double>(shape.room) < kReorderedShare * static_cast<double>(totalRoom)) continue;
     const double longer = std::max(shape.size.x, shape.size.y);
     const double shorter = std::min(shape.size.x, shape.size.y);
     const std::uint64_t size = static_cast<std::uint64_t>(longer) << 32 | static_cast<std::uint64_t>(shorter);
     const std::uint64_t random = mixed(variant, size);
     const double jitter = static_cast<double>(random >> 40) / (1 << 24);
     rank[steps[k].shape] = longer * (variant % 2 == 0 ? 0.6 + 0.8 * jitter : 1.0);
-    steps[k].stance = static_cast<Stance>(random % 3);
+    steps[k].aspect = static_cast<Aspect>(random % 3);
   }
   std::stable_sort(steps.begin(), steps.end(),
                    [&](const Step& a, const Step& b) { return rank[a.shape] > rank[b.shape]; });
@@ -68,12 +69,12 @@ std::vector<Step> stepsOf(std::span<const GridShape> shapes, const std::vector<s
 
 }  // namespace
 
-std::optional<Place> PagePacker::findPlace(const GridShape& shape, Stance stance) {
+std::optional<Place> PagePacker::findPlace(const GridShape& shape, Aspect aspect) {
   double bestScore = std::numeric_limits<double>::infinity();
   std::optional<Place> best;
   for (std::size_t i = 0; i < shape.orientations.size(); ++i) {
     const SearchMask& mask = shape.orientations[i].mask;
-    if (!hasStance(mask, stance)) continue;
+    if (!hasAspect(mask, aspect)) continue;
     // Contact all around is worth the shorter side: half a chart sunk into what is there.
     const double worth = std::min(mask.width, mask.height);
     const double reach = bestScore + worth - mask.height;
@@ -91,9 +92,9 @@ std::optional<Place> PagePacker::findPlace(const GridShape& shape, Stance stance
   return best;
 }
 
-std::optional<Place> PagePacker::place(const GridShape& shape, Stance stance) {
-  std::optional<Place> place = findPlace(shape, stance);
-  if (!place && stance != Stance::Any) place = findPlace(shape, Stance::Any);
+std::optional<Place> PagePacker::place(const GridShape& shape, Aspect aspect) {
+  std::optional<Place> place = findPlace(shape, aspect);
+  if (!place && aspect != Aspect::Any) place = findPlace(shape, Aspect::Any);
   if (place) take(shape, *place);
   return place;
 }
@@ -150,7 +151,7 @@ std::optional<std::vector<Place>> packOnPage(std::span<const GridShape> shapes, 
     std::size_t left = masks;
     for (const Step& step : stepsOf(shapes, chosen, room, variant)) {
       if (progress.cancelled() || left > packer.freeCells() || firstFit.load() < variant) return std::nullopt;
-      const auto place = packer.place(shapes[step.shape], step.stance);
+      const auto place = packer.place(shapes[step.shape], step.aspect);
       if (!place) return std::nullopt;
       places[step.shape] = *place;
       left -= shapes[step.shape].cells;

@@ -17,8 +17,8 @@ struct Place {
   Cell cell;
 };
 
-/// Which of a shape's orientations to try first.
-enum class Stance { Any, Wide, Tall };
+/// Names the orientations of a shape that are tried first: those at least as wide as tall, or the others.
+enum class Aspect { Any, Wide, Tall };
 
 class PagePacker {
  public:
@@ -26,8 +26,8 @@ class PagePacker {
       : settings_(settings), grid_(width, height, settings.border) {}
 
   /// Puts the shape where its upper edge comes lowest, the lower for touching what is there, in an orientation of the
-  /// stance if it fits in one of them. Nothing: it fits nowhere.
-  std::optional<Place> place(const GridShape& shape, Stance stance = Stance::Any);
+  /// aspect if it fits in one of them. Nothing: it fits nowhere.
+  std::optional<Place> place(const GridShape& shape, Aspect aspect = Aspect::Any);
 
   /// Puts it there, if it fits.
   bool placeAt(const GridShape& shape, const Place& place);
@@ -37,7 +37,7 @@ class PagePacker {
 
  private:
   void take(const GridShape& shape, const Place& place);
-  std::optional<Place> findPlace(const GridShape& shape, Stance stance);
+  std::optional<Place> findPlace(const GridShape& shape, Aspect aspect);
 
   GridSettings settings_;
   PackGrid grid_;
@@ -50,7 +50,7 @@ class PagePacker {
 void sortBySize(std::span<const GridShape> shapes, int pageSide, std::vector<std::uint32_t>& indices);
 
 /// All of `chosen` on one page of width x height cells, or nothing. Where plain order of size does not do it, tries
-/// other orders and stances for the shapes that matter, the more the fewer shapes there are; the first variant of a
+/// other orders and aspects for the shapes that matter, the more the fewer shapes there are; the first variant of a
 /// fixed sequence that fits wins, so the result does not depend on threads. Nothing also if cancelled.
 std::optional<std::vector<Place>> packOnPage(std::span<const GridShape> shapes, std::vector<std::uint32_t> chosen,
                                              const GridSettings& settings, int width, int height, Progress& progress);

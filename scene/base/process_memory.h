@@ -8,8 +8,8 @@ namespace lumel {
 /// Most memory that this process has had resident so far.
 std::size_t peakMemoryBytes();
 
-/// To be called before the first large allocation: arrays of a MiB and more are then taken from the system and given
-/// back to it one by one. The allocator's own way leaves holes of their size between others that live longer: a third
+/// Makes arrays of a MiB and more be taken from the system and given back to it one by one. It is called before the
+/// first large allocation. The allocator's own way leaves holes of their size between others that live longer: a third
 /// of the peak of a bake of a million triangles.
 void keepLargeArraysApart();
 

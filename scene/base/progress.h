@@ -18,7 +18,7 @@ class Progress {
   virtual bool cancelled() const { return false; }
 };
 
-/// For work that nobody watches or stops.
+/// Returns the progress of work that nobody watches or stops.
 inline Progress& noProgress() {
   static Progress silent;
   return silent;

@@ -84,7 +84,7 @@ Expected<PendingFile> FileSet::add(const fs::path& place) {
   for (int n = 0; folder == folders_.end(); ++n) {
     const fs::path hidden =
         dir / (kPrefix + std::to_string(getpid()) + (n > 0 ? "-" + std::to_string(n) : "") + kSuffix);
-    // Not made and no error: the name is taken, by another set of this process.
+    // A folder that is not made without an error has a name that another set of this process took.
     if (fs::create_directory(hidden, ec)) folder = folders_.insert(folder, hidden);
     if (ec) return cannotWrite(place, ec.message());
   }

@@ -30,8 +30,8 @@ class FileSet {
   }
   ~FileSet();
 
-  /// For a result that owns the folder `dir`: makes the folder if needed (the destructor removes it again if it is
-  /// empty) and calls recover. Errors: Failed.
+  /// Returns a set for a result that owns the folder `dir`: makes the folder if needed (the destructor removes it again
+  /// if it is empty) and calls recover. Errors: Failed.
   static Expected<FileSet> forFolder(const std::filesystem::path& dir);
 
   /// One more file, to be written to the returned `path`. The folder of `place` must exist. Errors: Usage (the set has

@@ -67,7 +67,7 @@ std::uint32_t componentToInteger(const std::uint8_t* p, int componentType) {
 
 std::string placeOf(int accessor) { return "accessors/" + std::to_string(accessor); }
 
-/// Where `count` elements of elementSize bytes lie in a buffer view.
+/// Returns the bytes of a buffer view in which `count` elements of elementSize bytes lie.
 Expected<std::span<const std::uint8_t>> elements(const GltfDocument& document, const std::string& place, int view,
                                                  std::size_t offset, std::size_t count, std::size_t stride,
                                                  std::size_t elementSize) {

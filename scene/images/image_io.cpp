@@ -299,7 +299,7 @@ Expected<void> ImageWriter::write(const Image& rows, const Progress& progress) {
   }
   for (int y = 0; y < rows.height; y += kRowsAtOnce) {
     if (progress.cancelled()) return interrupted();
-    // Not before the first rows: libpng complains on standard error about a file without any.
+    // The file is opened with its first rows, because libpng complains on standard error about a file without any.
     if (s.nextRow == 0 && (!s.output->set_ioproxy(s.bytes.get()) || !s.output->open(s.file.path.string(), s.spec)))
       return s.failed();
     const int count = std::min(kRowsAtOnce, rows.height - y);

@@ -201,7 +201,7 @@ float Texture::sampleAlpha(const TextureRef& ref, Vec2 uv) const {
 }
 
 void Texture::prefetch(const Footprint& at) const {
-  // Of the two rows, the left texels: the right ones mostly share their cache lines.
+  // It is enough to ask for the left texels of both rows: the right ones mostly share their cache lines.
   for (const int y : at.rows) {
     const std::size_t texel = texelAt(at.columns[0], y);
     if (bytes_.empty())

@@ -33,8 +33,8 @@ class Texture {
     float fx = 0.0f;
     float fy = 0.0f;
   };
-  /// Of a bilinear lookup (or nearest, as ref says) with wrap modes at ref.uvMatrix * uv; texel centres at
-  /// (i + 0.5) / size.
+  /// Returns the texels that a bilinear lookup (or nearest, as ref says) with wrap modes reads at ref.uvMatrix * uv,
+  /// and their weights. Texel centres lie at (i + 0.5) / size.
   Footprint footprint(const TextureRef& ref, Vec2 uv) const;
   Vec4 sample(const Footprint& at) const;
   Vec4 sample(const TextureRef& ref, Vec2 uv) const { return sample(footprint(ref, uv)); }

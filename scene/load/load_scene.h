@@ -9,7 +9,7 @@
 
 namespace lumel {
 
-/// By extension, whatever its case: .gltf, .glb or .obj.
+/// Tells by the extension, whatever its case, whether a file is a scene: .gltf, .glb or .obj.
 bool isSceneFile(const std::filesystem::path& file);
 
 /// Loads by extension. Errors: Input, one line naming file and place ("level.gltf: accessors/12: ...").

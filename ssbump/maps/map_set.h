@@ -1,4 +1,4 @@
-// From normals and occlusion to the maps that were asked for, band by band: shared by height maps and meshes.
+// Makes the maps that were asked for from normals and occlusion, band by band. Height maps and meshes share it.
 #pragma once
 
 #include <filesystem>

@@ -37,7 +37,7 @@ struct MeshTexels {
 Expected<MeshTexels> gatherMesh(const Scene& high, const Scene* low, const MeshSettings& settings,
                                 std::span<const Lobe> lobes, Progress& progress);
 
-/// From files to files. `low` empty: the flat tile. Errors as above and of loading and writing.
+/// Bakes files to files. An empty `low` stands for the flat tile. Errors as above and of loading and writing.
 Expected<BakeReport> bakeMesh(const std::filesystem::path& high, const std::filesystem::path& low,
                               const MeshSettings& settings, Progress& progress);
 

@@ -127,7 +127,7 @@ class Block {
     }
   }
 
-  /// Of a texel of the map.
+  /// Returns the sum of a texel of the map.
   float sum(int x, int y, std::size_t lobe) const {
     return sumRows_[static_cast<std::size_t>(y - y_ - firstRow_) * lobes_ + lobe][x - x_ - firstColumn_];
   }

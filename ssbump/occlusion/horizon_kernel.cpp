@@ -31,7 +31,8 @@ LUMEL_INLINE void loadTwice(typename Simd<Lanes>::Floats& v, const float* p) {
   v = __builtin_shuffle(v, lane);
 }
 
-/// For t in [0, 1e9]: g = (atan t + t q) / 2 and s = t^2 q / 2 with q = 1 / (1 + t^2), within 4e-8 of pi/2 or less.
+/// Computes g = (atan t + t q) / 2 and s = t^2 q / 2 with q = 1 / (1 + t^2) for t in [0, 1e9], within 4e-8 of pi/2 or
+/// less.
 /// atan: odd polynomial on [0, 1] (least squares, own fit), that of the reciprocal above. One division for both:
 /// 1 / (m (1 + t^2)) with m = max(t, 1).
 template <class Floats>

@@ -13,8 +13,8 @@ namespace {
 constexpr double kExactReach = 12;  // up to here every edge that the slice crosses is looked at
 constexpr int kUnitReach = 32;      // up to here every crossing along the dominant axis
 constexpr int kStepsPerOctave = 16;
-// Where in its window a maximum is taken to be, from the centre, in lengths: a rising slope has it at the far end, a
-// lone edge anywhere. Fractals and rocks come out too dark with 0, plateaus too bright with 1/2.
+// A maximum is taken to lie this many window lengths beyond the centre of its window: a rising slope has it at the far
+// end, a lone edge anywhere. Fractals and rocks come out too dark with 0, plateaus too bright with 1/2.
 constexpr double kWindowEnd = 0.25;
 
 struct Crossing {

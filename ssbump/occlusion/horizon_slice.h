@@ -1,4 +1,5 @@
-// Where the horizon of one azimuth is looked for: single edges of the surface nearby, maxima over windows farther away.
+// This file says where the horizon of one azimuth is looked for: single edges of the surface nearby, maxima over
+// windows farther away.
 #pragma once
 
 #include <span>

@@ -51,7 +51,7 @@ class CellHeights {
  public:
   /// Rows are at least `columns` cells long from any cell of the tile: what lies past the tile is 0.
   CellHeights(const HeightField& field, const TexelRect& tile, int cell, int columns);
-  /// From the texel (x, y) at a cell's corner.
+  /// These return the row of cells from the one whose corner is the texel (x, y).
   const float* lowest(int x, int y) const { return lowest_.data() + index(x, y); }
   const float* highest(int x, int y) const { return highest_.data() + index(x, y); }
   std::ptrdiff_t rowStride() const { return width_; }
@@ -94,7 +94,7 @@ class FarLevel {
     return data_.data() + (static_cast<std::ptrdiff_t>(row) * phases_ + column % cell_ / spacingX_) * width_ +
            column / cell_;
   }
-  /// From an entry to the one a cell below.
+  /// Returns the distance from an entry to the one a cell below.
   std::ptrdiff_t cellRowStride() const { return static_cast<std::ptrdiff_t>(cell_ / spacingY_) * phases_ * width_; }
 
  private:
