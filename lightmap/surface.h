@@ -41,7 +41,7 @@ struct Chart {
   int surface = 0;  // the first with a triangle of it; others may follow: of the same instance and page
   // May differ per chart where it was snapped or scaled per object.
   float texelsPerMeter = 0.0f;
-  // Of generated charts, for the next bake's layout (layout_memory.h); key 0: came with the scene's UVs.
+  // How the next bake finds a generated chart again (layout_memory.h); key 0: it came with the scene's UVs.
   std::uint64_t key = 0;
   int quarterTurns = 0;
   int x = 0;  // of its box's corner on its page, in texels

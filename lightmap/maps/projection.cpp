@@ -43,7 +43,7 @@ struct ConeNormals {
   }
 };
 
-/// a of lightmap/README.md ("Fit"): what G = mean w w^T has on its diagonal above the rest.
+/// a of lightmap/maps/README.md ("Fit"): what G = mean w w^T has on its diagonal above the rest.
 double diagonalExcess(const ConeNormals& cone) {
   double sum = 0;
   for (const Vec3d& w : cone.weights) sum += glm::dot(w, w) - (w.x * w.y + w.y * w.z + w.z * w.x);

@@ -1,5 +1,5 @@
 // How light from a direction is spread over the three RNM maps: the kernels K_i, c_i = (1/pi) Integral L(w) K_i(w) dw,
-// and the per-texel step after the sum. Derivations and known values: lightmap/README.md.
+// and the per-texel step after the sum. Derivations and known values: lightmap/maps/README.md.
 #pragma once
 
 #include <array>

@@ -1,5 +1,6 @@
 // The radiosity-normal-mapping basis, defined once: used by baker, ssbump, compositor and shader snippets.
-// Source: Green 2007, "Efficient Self-Shadowed Radiosity Normal Mapping", with the errata named in lightmap/README.md.
+// Source: Green 2007, "Efficient Self-Shadowed Radiosity Normal Mapping", with the errata named in
+// lightmap/maps/README.md.
 #pragma once
 
 #include <array>
