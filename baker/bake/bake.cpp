@@ -133,7 +133,7 @@ void finishTexels(const GatherIntegrator& integrator, const GatherState& state, 
   for (std::size_t i = first; i < last; ++i) {
     const BakedTexel texel = integrator.texel(state, page, i);
     if (!(texel.coverage > 0.0f)) continue;
-    const std::size_t t = integrator.firstOfPage(page) + i;
+    const std::size_t t = integrator.numberOf(page, i);
     SampleValue value{.flat = light.flat[t]};
     for (std::size_t k = 0; k < encoding.mapCount(); ++k) value.maps[k] = light.maps[k][t];
     encoding.finish(std::span(value.maps).first(encoding.mapCount()), value.flat);

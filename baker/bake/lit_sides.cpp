@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "baker/bake/bake.h"
+#include "baker/light/lit_scene.h"
 #include "lightmap/surface.h"
 #include "lightmap/texels/texels.h"
 #include "scene/base/union_find.h"
@@ -119,7 +120,8 @@ class SideAtlas {
   }
 
   /// Per side: the sum of its texels' light.
-  Expected<std::vector<double>> light(const Scene& scene, const Sides& asked, int samples, Progress& progress) const {
+  Expected<std::vector<double>> light(const LitScene& scene, const Sides& asked, int samples,
+                                      Progress& progress) const {
     std::vector<double> sums(asked.size(), 0.0);
     if (texels_.empty()) return sums;
     const BakeOptions options{
@@ -299,8 +301,10 @@ Expected<std::size_t> turnToLight(Scene& scene, const Progress& progress) {
   if (primitives.empty()) return std::size_t{0};
   const std::size_t patches = std::size_t{primitives.back().firstPatch} + primitives.back().patchCount;
   Unseen unseen(progress);
+  auto lit = LitScene::build(scene, kBounces != 0);
+  if (!lit) return lit.error();
   const auto measure = [&](const Sides& asked, int samples) {
-    return SideAtlas(scene, primitives, asked).light(scene, asked, samples, unseen);
+    return SideAtlas(scene, primitives, asked).light(**lit, asked, samples, unseen);
   };
   Sides asked(2 * patches);
   for (std::size_t i = 0; i < patches; ++i) asked[2 * i] = true;
@@ -312,6 +316,7 @@ Expected<std::size_t> turnToLight(Scene& scene, const Progress& progress) {
     asked[2 * i] = asked[2 * i + 1] = (*light)[2 * i] <= (odd[i] ? kDarkAgainstOthers : kDark) * mean;
   light = measure(asked, kSureSamples);
   if (!light) return light.error();
+  lit->reset();  // it refers to the triangles that are turned now
 
   std::vector<bool> dark(patches);
   for (std::size_t i = 0; i < patches; ++i)

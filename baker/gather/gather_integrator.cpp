@@ -90,6 +90,18 @@ Expected<void> GatherIntegrator::warmUpIfCold(GatherState& state, Progress& prog
   return {};
 }
 
+/// Whether nothing is left to gather of the open pass for waves [first, last). What is left out of it is reported then.
+bool GatherIntegrator::skipsTaken(const GatherState& state, std::size_t first, std::size_t last,
+                                  Progress& progress) const {
+  std::uint64_t leftOut = 0;
+  for (std::size_t w = first; w < last; ++w) {
+    if (!state.waves[w].done && state.waves[w].samples < state.openEnd) return false;
+    if (state.waves[w].done) leftOut += waves_[w].count;
+  }
+  progress.advance(leftOut * (state.openEnd - state.samples));
+  return true;
+}
+
 /// Gathers what is left of the open pass, and closes it.
 Expected<void> GatherIntegrator::gatherOpenPass(GatherState& state, Progress& progress, const GatherPauses& pauses,
                                                 const std::function<double()>& clock) {
@@ -99,11 +111,7 @@ Expected<void> GatherIntegrator::gatherOpenPass(GatherState& state, Progress& pr
     perPiece = static_cast<std::size_t>(std::max<std::uint64_t>(1, pauses.samplesPerPiece / kLanes / samples));
   for (std::size_t first = 0; first < waves_.size(); first += perPiece) {
     const std::size_t last = std::min(waves_.size(), first + perPiece);
-    const bool isTaken =
-        std::all_of(state.waves.begin() + static_cast<std::ptrdiff_t>(first),
-                    state.waves.begin() + static_cast<std::ptrdiff_t>(last),
-                    [&](const GatherState::OfWave& wave) { return !wave.done && wave.samples >= state.openEnd; });
-    if (isTaken) continue;
+    if (skipsTaken(state, first, last, progress)) continue;
     auto gathered = gatherPass(scene_, state, first, last, progress);
     clock();
     if (!gathered) return gathered;
@@ -126,7 +134,7 @@ bool GatherIntegrator::isDone(GatherState& state) const {
 
 TexelLight GatherIntegrator::takeLight(GatherState& state) const {
   TexelLight light = std::move(state.sums);
-  parallelFor(map_.size(), kTexelGrain, [&](std::size_t first, std::size_t last) {
+  parallelFor(waves_.texels(), kTexelGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t t = first; t < last; ++t) {
       const float scale = 1.0f / state.weightOf(t);
       light.flat[t] *= scale;
@@ -137,7 +145,7 @@ TexelLight GatherIntegrator::takeLight(GatherState& state) const {
 }
 
 BakedTexel GatherIntegrator::texel(const GatherState& state, std::uint32_t page, std::size_t index) const {
-  const std::size_t t = map_.firstOfPage(page) + index;
+  const std::size_t t = numberOf(page, index);
   const float scale = 1.0f / state.weightOf(t);
   BakedTexel baked;
   baked.coverage = state.coverage[t];

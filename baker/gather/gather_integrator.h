@@ -77,7 +77,10 @@ class GatherIntegrator {
   /// After run. takeLight once: the light leaves the state.
   TexelLight takeLight(GatherState& state) const;
   BakedTexel texel(const GatherState& state, std::uint32_t page, std::size_t index) const;
-  std::size_t firstOfPage(std::size_t page) const { return map_.firstOfPage(page); }
+  /// Number of a page's texel among those of all pages.
+  std::size_t numberOf(std::size_t page, std::size_t index) const {
+    return waves_[waves_.waveOf(page, index)].start + index % kLanes;
+  }
 
   /// After run, instead of GatherState::dropCache: what the surfaces reflect, by all samples. The cache leaves the
   /// state, and the integrator is of no more use for gathering.
@@ -87,6 +90,7 @@ class GatherIntegrator {
   Expected<void> warmUpIfCold(GatherState& state, Progress& progress);
   Expected<void> gatherOpenPass(GatherState& state, Progress& progress, const GatherPauses& pauses,
                                 const std::function<double()>& clock);
+  bool skipsTaken(const GatherState& state, std::size_t first, std::size_t last, Progress& progress) const;
   bool isDone(GatherState& state) const;
   std::uint32_t mostSamples() const;
 

@@ -2,8 +2,7 @@
 
 namespace lumel {
 
-WaveTexels::WaveTexels(const GatherScene& ofScene, std::uint32_t ofPage, std::size_t firstTexel,
-                       std::size_t texelCount)
+WaveTexels::WaveTexels(const GatherScene& ofScene, std::uint32_t ofPage, std::size_t firstTexel, std::size_t texelCount)
     : scene(ofScene),
       page(ofPage),
       first(firstTexel),

@@ -6,8 +6,9 @@ namespace lumel {
 namespace {
 
 /// Aims shadow rays at the samples that the receivers see, and weighs what these would bring.
-LUMEL_FOR_EACH_CPU int aimShadows(const ReceiverLanes& receivers, const LightSampleLanes& samples,
-                                  const SurfaceDensity& density, SampledLight& sampled) {
+template <bool kOpen>
+[[gnu::always_inline]] inline int aimShadowsOf(const ReceiverLanes& receivers, const LightSampleLanes& samples,
+                                               const SurfaceDensity& density, SampledLight& sampled) {
   const float constant = density.constant, perCosine = density.perCosine;
   RTCRay16& ray = sampled.shadows.ray;
   int count = 0;
@@ -15,7 +16,7 @@ LUMEL_FOR_EACH_CPU int aimShadows(const ReceiverLanes& receivers, const LightSam
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const Vec3 wi = samples.wi[lane];
     const float cosTheta = glm::dot(wi, receivers.ns[lane]);
-    const bool sees = (cosTheta > 0.0f) & (glm::dot(wi, receivers.ng[lane]) > 0.0f);
+    const bool sees = kOpen | ((cosTheta > 0.0f) & (glm::dot(wi, receivers.ng[lane]) > 0.0f));
     const Vec3 weight = samples.weight[lane];
     const bool brings = (weight.x != 0.0f) | (weight.y != 0.0f) | (weight.z != 0.0f);
     const bool taken = (receivers.active[lane] != 0) & sees & brings;
@@ -41,6 +42,15 @@ LUMEL_FOR_EACH_CPU int aimShadows(const ReceiverLanes& receivers, const LightSam
     count += taken ? 1 : 0;
   }
   return count;
+}
+
+LUMEL_FOR_EACH_CPU int aimShadows(const ReceiverLanes& receivers, const LightSampleLanes& samples,
+                                  const SurfaceDensity& density, SampledLight& sampled) {
+  return aimShadowsOf<false>(receivers, samples, density, sampled);
+}
+LUMEL_FOR_EACH_CPU int aimOpenShadows(const ReceiverLanes& receivers, const LightSampleLanes& samples,
+                                      const SurfaceDensity& density, SampledLight& sampled) {
+  return aimShadowsOf<true>(receivers, samples, density, sampled);
 }
 
 }  // namespace
@@ -94,7 +104,8 @@ std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& st
           sky != nullptr ? *sky : transport.environment.findSky(samples.draw2D(patternBase + kSky)), taken);
       break;
   }
-  const int count = aimShadows(receivers, taken, density, sampled);
+  const int count = receivers.open ? aimOpenShadows(receivers, taken, density, sampled)
+                                   : aimShadows(receivers, taken, density, sampled);
   sampled.shadows.any = count > 0;
   return static_cast<std::uint64_t>(count);
 }

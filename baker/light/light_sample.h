@@ -12,6 +12,7 @@ struct ReceiverLanes {
   const Vec3Lanes& ng;
   const Vec3Lanes& ns;
   const Vec3Lanes& rayStart;
+  bool open = false;  // points in space: light arrives from all sides, and both normals are zero
 };
 
 /// One light sample of every lane as seen from its receiver, before visibility.

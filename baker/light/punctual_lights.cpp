@@ -49,10 +49,11 @@ LightBounds boundsOf(const Light& light) {
          attenuation(p, light.position, light.direction, light.perRange2, light.cosOuter, light.perCone, wi);
 }
 
-/// Returns what the choice among lights is in proportion to.
+/// Returns what the choice among lights is in proportion to. A normal of zero leaves the side open.
 [[gnu::always_inline]] inline float importanceOf(const Vec3& facing, const Vec3& wi, const Vec3& n) {
   const float cosTheta = glm::dot(wi, n);
-  return pick(cosTheta > 0.0f, luminance(facing) * (1.0f + 2.0f * cosTheta), 0.0f);
+  const bool anySide = (n.x == 0.0f) & (n.y == 0.0f) & (n.z == 0.0f);
+  return pick((cosTheta > 0.0f) | anySide, luminance(facing) * (1.0f + 2.0f * cosTheta), 0.0f);
 }
 
 /// Samples one source with a position for all lanes.

@@ -153,6 +153,8 @@ struct SurfaceDensity {
 /// The densities of sampleGatherHemisphere and of sampleCosineHemisphere.
 inline constexpr SurfaceDensity kGatherDensity{0.25f * kInvPi, 0.5f * kInvPi};
 inline constexpr SurfaceDensity kCosineDensity{0.0f, kInvPi};
+/// That of a point in space, which gathers from all directions alike.
+inline constexpr SurfaceDensity kSphereDensity{0.25f * kInvPi, 0.0f};
 
 /// Returns the weight of a sample taken with density `pdf` where another technique would take it with `other` (Veach
 /// 1997, the power heuristic with exponent 2, one sample of each). An `other` of zero gives 1, an infinite one 0.

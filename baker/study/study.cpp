@@ -6,11 +6,13 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "baker/bake/finish.h"
 #include "baker/bake/quality.h"
+#include "baker/light/lit_scene.h"
 #include "baker/study/study_density.h"
 #include "baker/study/study_maps.h"
 #include "lightmap/texels/texels.h"
@@ -122,6 +124,7 @@ class Studying {
   }
 
   const Scene& scene_;
+  std::unique_ptr<LitScene> lit_;  // made for the first bake and used by all
   StudyOptions options_;
   Progress& progress_;
   const Stopwatch sinceStart_;
@@ -140,7 +143,12 @@ Expected<Studying::Baked> Studying::bakeOnce(const Atlas& atlas, const std::vect
                                              const BakeOptions& options, double expected) {
   ShareOfProgress share(progress_, expected);
   const double cpu = cpuSecondsNow();
-  auto result = bake(scene_, atlas, texels, options, share);
+  if (!lit_) {
+    auto lit = LitScene::build(scene_, options_.bounces != 0);
+    if (!lit) return lit.error();
+    lit_ = *std::move(lit);
+  }
+  auto result = bake(*lit_, atlas, texels, options, share);
   if (!result) return result.error();
   Baked baked{std::move(*result), 0.0, cpuSecondsNow() - cpu};
   baked.seconds = baked.result.stats.seconds;
