@@ -9,22 +9,26 @@
 namespace lumel {
 namespace {
 
-/// A texture's emission is averaged over a triangular grid with this many points on a side.
-constexpr int kEmissionGrid = 8;
+/// A grid of so many points on a side finds the mean opacity of a triangle that is cut out ...
+constexpr int kOpacityGrid = 8;
+/// ... which counts as no less than this: what lies between the points may be opaque.
+constexpr float kLeastOpacity = 1.0f / 64;
+/// Emitters that divided triangles become, in all, shared in proportion to their light; and the most of one.
+constexpr double kBoxes = 8192.0;
+constexpr double kMostBoxes = 128.0;
+/// A hit this far beyond the border of a part, in barycentric weights of the part, still belongs to it.
+constexpr float kBeyondBorder = 1e-3f;
+constexpr Vec3 kLuminance(0.2126f, 0.7152f, 0.0722f);
 
-/// Returns the mean luminance over a triangle of what it sends out where it is not cut out.
-float meanEmission(const Materials& materials, const Primitive& primitive, std::uint32_t triangle) {
-  const Material& material = materials.material(primitive.material);
-  const bool varies = material.emissionMap || materials.needsAlphaTest(primitive);
-  const int n = varies ? kEmissionGrid : 1;
+/// Returns the mean over a triangle of a function of its points, by a triangular grid.
+template <class Value>
+double gridMean(const Primitive& primitive, std::uint32_t triangle, Value value) {
   double sum = 0.0;
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j) {
-      const Vec2 u = (Vec2(i, j) + 0.5f) / static_cast<float>(n);
-      const TrianglePoint point{&primitive, triangle, sampleTriangle(u)};
-      sum += static_cast<double>(luminance(materials.emission(point)) * materials.opacity(point));
-    }
-  return static_cast<float>(sum / (n * n));
+  for (int i = 0; i < kOpacityGrid; ++i)
+    for (int j = 0; j < kOpacityGrid; ++j)
+      sum += static_cast<double>(value(
+          TrianglePoint{&primitive, triangle, sampleTriangle((Vec2(i, j) + 0.5f) / static_cast<float>(kOpacityGrid))}));
+  return sum / (kOpacityGrid * kOpacityGrid);
 }
 
 [[gnu::always_inline]] inline bool bySolidAngle(float solidAngle) {
@@ -83,35 +87,54 @@ struct alignas(64) EmissiveTriangles::Chosen {
 
 EmissiveTriangles::EmissiveTriangles(RayScene& rays, const Materials& materials)
     : rays_(&rays), materials_(&materials) {
+  std::vector<Emitter> whole;
   for (std::uint32_t p = 0; p < rays.parts().size(); ++p) {
     ScenePart& part = rays.parts()[p];
     if (!materials.emits(part.primitive->material)) continue;
-    part.firstEmitter = static_cast<std::int64_t>(triangles_.size());
-    for (std::uint32_t t = 0; t < part.primitive->triangleCount(); ++t)
-      triangles_.push_back({.part = p, .triangle = t});
+    part.firstEmitter = static_cast<std::int64_t>(whole.size());
+    for (std::uint32_t t = 0; t < part.primitive->triangleCount(); ++t) whole.push_back({.part = p, .triangle = t});
   }
-  std::vector<LightBounds> bounds(triangles_.size());
-  parallelFor(triangles_.size(), 256, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      Emitter& emitter = triangles_[i];
-      describe(emitter);
-      const Vec3 second = emitter.corner + emitter.e1;
-      const Vec3 third = emitter.corner + emitter.e2;
-      bounds[i].min = glm::min(emitter.corner, glm::min(second, third));
-      bounds[i].max = glm::max(emitter.corner, glm::max(second, third));
-      bounds[i].axis = emitter.ng;
-      bounds[i].cosSpread = emitter.back > 0.0f ? -1.0f : 1.0f;
-      bounds[i].power = 0.5f * emitter.doubleArea * emitter.luminance;
-    }
+  if (whole.empty()) return;
+  const Fields fields = fieldsOf(rays);
+  parallelFor(whole.size(), 64, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i)
+      describe(whole[i], fields[static_cast<std::size_t>(rays.parts()[whole[i].part].primitive->material)].get());
   });
+  divide(whole, fields);
+  std::vector<LightBounds> bounds(triangles_.size());
+  for (std::size_t i = 0; i < triangles_.size(); ++i) {
+    const Emitter& emitter = triangles_[i];
+    const Vec3 second = emitter.corner + emitter.e1;
+    const Vec3 third = emitter.corner + emitter.e2;
+    bounds[i].min = glm::min(emitter.corner, glm::min(second, third));
+    bounds[i].max = glm::max(emitter.corner, glm::max(second, third));
+    bounds[i].axis = emitter.ng;
+    bounds[i].cosSpread = emitter.back > 0.0f ? -1.0f : 1.0f;
+    bounds[i].power = 0.5f * emitter.doubleArea * emitter.luminance;
+  }
   tree_ = LightTree(bounds);
   for (const std::uint32_t triangle : tree_.onlyLeaf()) few_.push_back(triangles_[triangle]);
   uniform_ = std::all_of(triangles_.begin(), triangles_.end(), [](const Emitter& e) { return e.uniform; });
 }
 
-void EmissiveTriangles::describe(Emitter& emitter) const {
+EmissiveTriangles::Fields EmissiveTriangles::fieldsOf(const RayScene& rays) const {
+  Fields fields;
+  for (const ScenePart& part : rays.parts()) {
+    const auto index = static_cast<std::size_t>(part.primitive->material);
+    if (fields.size() <= index) fields.resize(index + 1);
+    const Texture* texture = part.firstEmitter < 0 ? nullptr : materials_->emissionTexture(part.primitive->material);
+    if (texture == nullptr || fields[index]) continue;
+    const Material& material = materials_->material(part.primitive->material);
+    fields[index] = std::make_unique<EmissionField>(*texture, material.emissionMap,
+                                                    kLuminance * glm::max(material.emission, Vec3(0.0f)));
+  }
+  return fields;
+}
+
+void EmissiveTriangles::describe(Emitter& emitter, const EmissionField* field) const {
   const ScenePart& part = rays_->parts()[emitter.part];
-  const Material& material = materials_->material(part.primitive->material);
+  const Primitive& primitive = *part.primitive;
+  const Material& material = materials_->material(primitive.material);
   const std::array<Vec3, 3> corners = rays_->corners(part, emitter.triangle);
   emitter.corner = corners[0];
   emitter.e1 = corners[1] - corners[0];
@@ -121,15 +144,110 @@ void EmissiveTriangles::describe(Emitter& emitter) const {
   emitter.ng = glm::normalize(cross) * part.frontSign;
   emitter.offsetMeters = offsetDistance(corners, part.translation);
   emitter.back = material.doubleSided ? 1.0f : 0.0f;
-  emitter.uniform = !material.emissionMap && !materials_->needsAlphaTest(*part.primitive);
-  emitter.radiance = materials_->emission({part.primitive, emitter.triangle, Vec2(1.0f / 3)});
-  emitter.luminance = meanEmission(*materials_, *part.primitive, emitter.triangle);
+  const bool cutOut = materials_->needsAlphaTest(primitive);
+  emitter.uniform = field == nullptr && !cutOut;
+  emitter.radiance = materials_->emission({&primitive, emitter.triangle, Vec2(1.0f / 3)});
+  emitter.luminance = luminance(emitter.radiance);
+  if (field != nullptr) emitter.luminance = static_cast<float>(meanOnTexture(emitter, *field));
+  if (cutOut) {
+    const double opacity =
+        gridMean(primitive, emitter.triangle, [&](const TrianglePoint& p) { return materials_->opacity(p); });
+    emitter.luminance *= std::max(static_cast<float>(opacity), kLeastOpacity);
+  }
+  emitter.shining.luminance = emitter.luminance;
+}
+
+std::optional<TexturedTriangle> EmissiveTriangles::onTexture(const Emitter& emitter, const EmissionField* field) const {
+  if (field == nullptr) return {};
+  const Primitive& primitive = *rays_->parts()[emitter.part].primitive;
+  const int uvSet = materials_->material(primitive.material).emissionMap.uvSet;
+  const auto at = [&](const Vec2& weights) {
+    return field->pointOf(uvAt({&primitive, emitter.triangle, weights}, uvSet));
+  };
+  return TexturedTriangle(*field, {at({0, 0}), at({1, 0}), at({0, 1})}, emitter.e1, emitter.e2);
+}
+
+/// Returns the mean luminance over a triangle: exact where the triangle has an area in the texture. Where it is a line
+/// or a point there, a grid of points finds it, and never as nothing where anything on the line shines.
+double EmissiveTriangles::meanOnTexture(const Emitter& emitter, const EmissionField& field) const {
+  const TexturedTriangle triangle = *onTexture(emitter, &field);
+  if (!triangle.isLine()) return triangle.mean();
+  if (!triangle.shines()) return 0.0;
+  const double mean = gridMean(*rays_->parts()[emitter.part].primitive, emitter.triangle,
+                               [&](const TrianglePoint& p) { return luminance(materials_->emission(p)); });
+  const double brightest = static_cast<double>(
+      luminance(glm::max(materials_->material(rays_->parts()[emitter.part].primitive->material).emission, Vec3(0.0f))));
+  return std::max(mean, brightest / (kOpacityGrid * kOpacityGrid));
+}
+
+std::vector<ShiningPart> EmissiveTriangles::partsOf(const Emitter& emitter, const EmissionField* field,
+                                                    std::size_t mostBoxes) const {
+  if (!(emitter.luminance > 0.0f)) return {};
+  const std::optional<TexturedTriangle> triangle = onTexture(emitter, field);
+  if (!triangle || triangle->isLine()) return {emitter.shining};
+  std::vector<ShiningPart> parts = triangle->parts(mostBoxes);
+  // Cut-outs take the same share of every part.
+  const auto opacity = static_cast<float>(static_cast<double>(emitter.luminance) / triangle->mean());
+  for (ShiningPart& part : parts) part.luminance *= opacity;
+  return parts.empty() ? std::vector<ShiningPart>{emitter.shining} : parts;
+}
+
+/// Makes emitters of whole triangles, in their order.
+void EmissiveTriangles::divide(const std::vector<Emitter>& whole, const Fields& fields) {
+  const auto lightOf = [](const Emitter& e) {
+    return static_cast<double>(e.doubleArea) * static_cast<double>(e.luminance);
+  };
+  double total = 0.0;
+  for (const Emitter& emitter : whole) total += std::isfinite(lightOf(emitter)) ? lightOf(emitter) : 0.0;
+  std::vector<std::vector<ShiningPart>> parts(whole.size());
+  parallelFor(whole.size(), 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      const double share = total > 0.0 ? lightOf(whole[i]) / total : 0.0;
+      parts[i] =
+          partsOf(whole[i], fields[static_cast<std::size_t>(rays_->parts()[whole[i].part].primitive->material)].get(),
+                  static_cast<std::size_t>(std::clamp(kBoxes * share, 1.0, kMostBoxes)));
+    }
+  });
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    firstOf_.push_back(static_cast<std::uint32_t>(triangles_.size()));
+    const Vec3 e1 = whole[i].e1, e2 = whole[i].e2;
+    for (const ShiningPart& part : parts[i]) {
+      Emitter emitter = whole[i];
+      const Vec2 d1 = part.corners[1] - part.corners[0], d2 = part.corners[2] - part.corners[0];
+      emitter.corner = whole[i].corner + part.corners[0].x * e1 + part.corners[0].y * e2;
+      emitter.e1 = d1.x * e1 + d1.y * e2;
+      emitter.e2 = d2.x * e1 + d2.y * e2;
+      emitter.doubleArea = whole[i].doubleArea * std::abs(d1.x * d2.y - d1.y * d2.x);
+      emitter.luminance = part.luminance;
+      emitter.shining = part;
+      triangles_.push_back(emitter);
+    }
+  }
+  firstOf_.push_back(static_cast<std::uint32_t>(triangles_.size()));
 }
 
 Vec3 EmissiveTriangles::radianceAt(const Emitter& emitter, Vec2 barycentric) const {
   if (emitter.uniform) return emitter.radiance;
-  const TrianglePoint point{rays_->parts()[emitter.part].primitive, emitter.triangle, barycentric};
+  const std::array<Vec2, 3>& c = emitter.shining.corners;
+  const TrianglePoint point{rays_->parts()[emitter.part].primitive, emitter.triangle,
+                            c[0] + barycentric.x * (c[1] - c[0]) + barycentric.y * (c[2] - c[0])};
   return materials_->emission(point) * materials_->opacity(point);
+}
+
+std::uint32_t EmissiveTriangles::emitterAt(std::size_t triangle, const Vec2& barycentric) const {
+  std::uint32_t best = kNone;
+  float deepest = -kBeyondBorder;
+  for (std::uint32_t i = firstOf_[triangle]; i < firstOf_[triangle + 1]; ++i) {
+    const std::array<Vec2, 3>& c = triangles_[i].shining.corners;
+    const Vec2 d1 = c[1] - c[0], d2 = c[2] - c[0], p = barycentric - c[0];
+    const float perTwiceArea = 1.0f / (d1.x * d2.y - d1.y * d2.x);
+    const float w1 = (p.x * d2.y - p.y * d2.x) * perTwiceArea, w2 = (d1.x * p.y - d1.y * p.x) * perTwiceArea;
+    const float depth = std::min({w1, w2, 1.0f - w1 - w2});
+    if (!(depth > deepest)) continue;
+    deepest = depth;
+    best = i;
+  }
+  return best;
 }
 
 float EmissiveTriangles::importance(std::uint32_t triangle, const Vec3& p) const {
@@ -307,7 +425,8 @@ void EmissiveTriangles::sample(const Vec3Lanes& p, const LaneFlags& active, cons
 float EmissiveTriangles::pdf(const HitSurface& hit, const Vec3& origin) const {
   const std::int64_t first = rays_->parts()[hit.part].firstEmitter;
   if (first < 0) return 0.0f;
-  const auto light = static_cast<std::uint32_t>(first) + hit.point.triangle;
+  const std::uint32_t light = emitterAt(static_cast<std::size_t>(first) + hit.point.triangle, hit.point.barycentric);
+  if (light == kNone) return 0.0f;
   const float probability =
       tree_.probability({origin}, light, [&](std::uint32_t triangle) { return importance(triangle, origin); });
   if (!(probability > 0.0f)) return 0.0f;

@@ -2,11 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "baker/light/light_sample.h"
 #include "baker/light/light_tree.h"
+#include "baker/light/shining_parts.h"
 #include "baker/rays/lanes.h"
 #include "baker/rays/materials.h"
 #include "baker/rays/ray_scene.h"
@@ -18,14 +21,17 @@ namespace lumel {
 class EmissiveTriangles {
  public:
   EmissiveTriangles() = default;
-  /// Finds them and sets ScenePart::firstEmitter.
+  /// Finds them and sets ScenePart::firstEmitter. A triangle whose texture varies is divided into its shining parts
+  /// (TexturedTriangle), which are emitters of their own; what shines nowhere is none. Whether anything shines at all
+  /// is thus decided exactly: empty().
   EmissiveTriangles(RayScene& rays, const Materials& materials);
 
   bool empty() const { return tree_.empty(); }
-  std::size_t size() const { return triangles_.size(); }
+  /// Returns the number of triangles with an emissive material, dark ones included.
+  std::size_t size() const { return firstOf_.empty() ? 0 : firstOf_.size() - 1; }
 
   /// Density: over triangles by what they can bring to p unshadowed, estimated for groups of them (LightTree) and for
-  /// the few of a group by mean emitted luminance (roughly, over the texture) times solid angle; within a triangle
+  /// the few of a group by mean emitted luminance times solid angle; within a triangle
   /// uniform by solid angle where that is not small, else by area. Emission from the front alone unless the material
   /// is doubleSided, times opacity.
   /// Lanes that are not `active` get a weight of zero.
@@ -56,10 +62,20 @@ class EmissiveTriangles {
     bool uniform = false;  // it sends out `radiance` everywhere
     std::uint32_t part = 0;
     std::uint32_t triangle = 0;
+    ShiningPart shining{};  // of the triangle
   };
-  /// Fills all from the part and the triangle.
-  void describe(Emitter& emitter) const;
+  /// Emission textures as fields, by material; null: it has none.
+  using Fields = std::vector<std::unique_ptr<EmissionField>>;
+  Fields fieldsOf(const RayScene& rays) const;
+  /// Fills all but what is left of a whole triangle when it is divided; `shining` becomes the whole triangle.
+  void describe(Emitter& emitter, const EmissionField* field) const;
+  std::optional<TexturedTriangle> onTexture(const Emitter& emitter, const EmissionField* field) const;
+  double meanOnTexture(const Emitter& emitter, const EmissionField& field) const;
+  std::vector<ShiningPart> partsOf(const Emitter& emitter, const EmissionField* field, std::size_t mostBoxes) const;
+  void divide(const std::vector<Emitter>& whole, const Fields& fields);
   Vec3 radianceAt(const Emitter& emitter, Vec2 barycentric) const;
+  /// Returns the emitter that a point of a triangle belongs to, or kNone.
+  std::uint32_t emitterAt(std::size_t triangle, const Vec2& barycentric) const;
   /// Holds the emitters that the lanes chose, and the probability of each choice.
   struct Chosen;
   static void chooseAmongFew(std::span<const Emitter> few, const Vec3Lanes& p, const UnitLanes& u, Chosen& chosen);
@@ -71,7 +87,9 @@ class EmissiveTriangles {
 
   const RayScene* rays_ = nullptr;
   const Materials* materials_ = nullptr;
-  std::vector<Emitter> triangles_;
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+  std::vector<Emitter> triangles_;      // emitters: triangles or parts of them
+  std::vector<std::uint32_t> firstOf_;  // by triangle: its first emitter; one more entry ends the last
   LightTree tree_;
   std::vector<Emitter> few_;  // all that can be chosen, where one leaf of the tree holds them
   bool uniform_ = true;       // all are

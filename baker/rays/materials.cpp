@@ -111,14 +111,19 @@ Vec3 Materials::albedo(const AlbedoLookup& lookup) {
   return glm::clamp(color, Vec3(0.0f), Vec3(1.0f));
 }
 
+const Texture* Materials::emissionTexture(int index) const {
+  const TextureRef& ref = material(index).emissionMap;
+  if (!ref || static_cast<std::size_t>(ref.image) >= srgbByImage_.size()) return nullptr;
+  const auto& texture = srgbByImage_[static_cast<std::size_t>(ref.image)];
+  return texture ? &texture->finest() : nullptr;
+}
+
 Vec3 Materials::emission(const TrianglePoint& point) const {
   const Material& m = material(point.primitive->material);
   if (!emits(point.primitive->material)) return Vec3(0.0f);
   Vec3 radiance = glm::max(m.emission, Vec3(0.0f));
-  if (m.emissionMap && static_cast<std::size_t>(m.emissionMap.image) < srgbByImage_.size()) {
-    if (const auto& texture = srgbByImage_[static_cast<std::size_t>(m.emissionMap.image)])
-      radiance *= Vec3(texture->finest().sample(m.emissionMap, uvAt(point, m.emissionMap.uvSet)));
-  }
+  if (const Texture* texture = emissionTexture(point.primitive->material))
+    radiance *= Vec3(texture->sample(m.emissionMap, uvAt(point, m.emissionMap.uvSet)));
   return radiance;
 }
 

@@ -58,6 +58,8 @@ class Materials {
   /// Returns the radiance in nits that is sent out from the front (and from the back where doubleSided). Alpha is not
   /// applied.
   Vec3 emission(const TrianglePoint& point) const;
+  /// Returns the texture that emission() is multiplied by; null: there is none.
+  const Texture* emissionTexture(int material) const;
   /// Returns 0 or 1 for MASK (the cut-off applied), and for BLEND the share of light that is held, 0..1.
   float opacity(const TrianglePoint& point) const;
 
