@@ -30,6 +30,7 @@ constexpr int kSamplesInTheDark = 8;
 struct WaveStats {
   std::uint64_t rays = 0;
   std::uint64_t shadowRays = 0;
+  std::uint64_t cutPaths = 0;
   std::size_t nonFinite = 0;
   std::vector<NonFiniteSample> firstNonFinite;
   std::uint32_t mostSamples = 0;
@@ -96,6 +97,7 @@ BakeStats sumUp(std::span<const WaveStats> waves, const BakeOptions& options) {
   for (const WaveStats& wave : waves) {
     total.rays += wave.rays;
     total.shadowRays += wave.shadowRays;
+    total.cutPaths += wave.cutPaths;
     total.nonFiniteSamples += wave.nonFinite;
     luminanceSum += wave.luminance;
     errorSum += wave.standardError;
@@ -109,6 +111,10 @@ BakeStats sumUp(std::span<const WaveStats> waves, const BakeOptions& options) {
                         std::to_string(s.texel.x) + ", " + std::to_string(s.texel.y) + "), sample " +
                         std::to_string(s.sample) + ", seed " + std::to_string(options.seed));
   }
+  if (total.cutPaths > 0)
+    notes.push_back("light of more than " + std::to_string(kMostLosslessHits) +
+                    " bounces is missing: surfaces of albedo 1 kept " + std::to_string(total.cutPaths) +
+                    " paths without end; give them a lower albedo, or say how many --bounces count");
   total.notes = std::move(notes);
   if (valid > 0) {
     total.meanFlat = luminanceSum / static_cast<double>(valid);
@@ -279,6 +285,7 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
       WaveStats& stats = waveStats[w];
       stats.rays = done.rays;
       stats.shadowRays = done.shadowRays;
+      stats.cutPaths = done.cutPaths;
       stats.nonFinite = done.nonFinite.size();
       done.nonFinite.resize(std::min(done.nonFinite.size(), kMostNotes));
       stats.firstNonFinite = std::move(done.nonFinite);

@@ -32,6 +32,7 @@ struct BakeStats {
   std::uint64_t rays = 0;        // closest-hit
   std::uint64_t shadowRays = 0;  // occlusion
   double seconds = 0.0;
+  std::uint64_t cutPaths = 0;               // paths that were ended by force, named in `notes` (kMostLosslessHits)
   std::size_t nonFiniteSamples = 0;         // counted and left out of the sums, named in `notes`; never silently zeroed
   double meanFlat = 0.0;                    // mean luminance over covered, valid texels
   std::optional<double> meanStandardError;  // mean of aux stderr over the same; none of too few samples

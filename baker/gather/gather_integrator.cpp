@@ -13,6 +13,8 @@ namespace lumel {
 namespace {
 
 constexpr std::size_t kTexelGrain = 4096;
+/// Longest path through surfaces without texels, where bounces have no end of their own.
+constexpr int kLongestPath = 64;
 
 CacheLevels levelsFor(int bounces) {
   if (bounces < 0) return {.count = 1, .base = 0, .endless = true};

@@ -39,11 +39,17 @@ struct Flight {
 template <class Sink>
 class GatherTracer {
  public:
-  /// Hits at depth `lastDepth` bring their own emission alone. `reflectance`: of the texels, where it is known; else
-  /// empty. It is what the back of a surface with a lightmap reflects, as its front does.
+  /// Hits choose among punctual lights as `punctual` says. Hits at depth `lastDepth` bring their own emission alone.
+  /// `reflectance`: of the texels, where it is known; else empty. It is what the back of a surface with a lightmap
+  /// reflects, as its front does.
   GatherTracer(const LightTransport& transport, const TexelMap& map, std::span<const PackedColor> reflectance,
-               int lastDepth, Sink& sink)
-      : transport_(transport), map_(map), reflectance_(reflectance), lastDepth_(lastDepth), sink_(sink) {
+               int lastDepth, PunctualChoice punctual, Sink& sink)
+      : transport_(transport),
+        map_(map),
+        reflectance_(reflectance),
+        lastDepth_(lastDepth),
+        punctual_(std::move(punctual)),
+        sink_(sink) {
     spots_.reserve(kManySpots + kLanes);
   }
 
@@ -198,12 +204,13 @@ class GatherTracer {
     Vec3Lanes p, ng, ns, rayStart;
     receiveAt(hits, p, ng, ns, rayStart);
     const ReceiverLanes receivers{hits.active, p, ng, ns, rayStart};
-    shadowRays_ +=
-        directLight(transport_, receivers, samples, 0, TraceMode::Packet, kCosineDensity,
-                    [&](int lane, const Vec3& wi, const Vec3& light) {
-                      const auto l = static_cast<std::size_t>(lane);
-                      sink_.light(flights_[l], light * (glm::dot(wi, ns[l]) * kInvPi), flights_[l].depth + 1);
-                    });
+    shadowRays_ += directLight(
+        transport_, receivers, samples, 0, TraceMode::Packet, kCosineDensity,
+        [&](int lane, const Vec3& wi, const Vec3& light) {
+          const auto l = static_cast<std::size_t>(lane);
+          sink_.light(flights_[l], light * (glm::dot(wi, ns[l]) * kInvPi), flights_[l].depth + 1);
+        },
+        punctual_.learnt.isUseful() ? &punctual_ : nullptr);
     alignas(64) float pdf[kLanes];
     aimByCosine(receivers, samples.draw2D(kDirection), packet_, pdf);
     const UnitLanes chances = samples.draw1D(kRoulette);
@@ -224,6 +231,7 @@ class GatherTracer {
   const TexelMap& map_;
   const std::span<const PackedColor> reflectance_;
   const int lastDepth_;
+  PunctualChoice punctual_;
   Sink& sink_;
   std::vector<Spot> spots_;  // left to be shaded
   // Rays that go on, and what is known of where they ended.

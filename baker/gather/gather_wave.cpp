@@ -6,7 +6,7 @@
 namespace lumel {
 
 GatherWave::GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t first, std::size_t count)
-    : wave_(scene, page, first, count), pilot_(scene.transport.rays) {}
+    : wave_(scene, page, first, count), near_(wave_), pilot_(scene.transport.rays) {}
 
 void GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
                         std::span<const std::uint8_t> buried, std::span<LightSpread> spreads, GatheredWave& result) {
@@ -19,10 +19,12 @@ void GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const 
   if (coveredCount_ == 0) return;
   for (std::size_t lane = 0; lane < wave_.count; ++lane)
     if ((wave_.first + lane) % kProbeStride == 0) sink.probedLane = lane;
-  GatherTracer tracer(wave_.scene.transport, wave_.scene.map, wave_.scene.reflectance, wave_.scene.lastDepth, sink);
+  GatherTracer tracer(wave_.scene.transport, wave_.scene.map, wave_.scene.reflectance, wave_.scene.lastDepth,
+                      punctualChoice(wave_.scene.transport.punctual, wave_.scene.strategies, spreads), sink);
   for (std::uint32_t sample = first; sample < end;) {
     const NetRange net = netAt(sample, end);
     if (!spreads.empty()) gatherLight(net, spreads, sink);
+    near_.gather(wave_, net, sink);
     wave_.points.draw(wave_.samplers, kFootprint, net.first, std::min(WavePoints::kMost, net.count()));
     sink.tallied = !spreads.empty() && isPilot(net.first);
     gatherRays(net, tracer, sink);
@@ -95,8 +97,9 @@ void GatherWave::sampleStrategy(std::size_t strategy, std::uint32_t first, std::
     const PointLanes points = wave_.points[s];
     if (isSky && s + 1 < end) findSky(s + 1);
     wave_.lightSamples.setSampleOfAll(s);
-    const std::uint64_t rays = takeLight(wave_.scene.transport, wave_.scene.strategies[strategy], points.receivers(),
-                                         wave_.lightSamples, 0, kGatherDensity, sampled, isSky ? &sky[s % 2] : nullptr);
+    const std::uint64_t rays =
+        takeLight(wave_.scene.transport, wave_.scene.strategies[strategy], near_.receivers(points), wave_.lightSamples,
+                  0, kGatherDensity, sampled, isSky ? &sky[s % 2] : nullptr);
     if (rays == 0) continue;
     sink.result.shadowRays += rays;
     wave_.scene.transport.rays.occluded(sampled.shadows, TraceMode::Packet);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "baker/gather/gather_sink.h"
+#include "baker/gather/near_texels.h"
 #include "baker/gather/wave_texels.h"
 
 namespace lumel {
@@ -63,6 +64,7 @@ class GatherWave {
   void collectSky(const AimedRays& rays, std::uint32_t lanes, Vec3Lanes& light, GatherSink& sink) const;
 
   WaveTexels wave_;
+  NearTexels near_;
   std::size_t coveredCount_ = 0;
   std::vector<LightTally> lightTallies_;  // of the strategies
   NetLanes net_;

@@ -58,4 +58,23 @@ int lightPower(std::span<const LightSpread> all, std::size_t strategy) {
   return static_cast<int>(std::lround(std::clamp(std::log2(share), float{kFewest}, float{kMost})));
 }
 
+PunctualChoice punctualChoice(const PunctualLights& lights, std::span<const LightStrategy> strategies,
+                              std::span<const LightSpread> spreads) {
+  PunctualChoice choice{LearntChoice(lights.groups())};
+  for (std::size_t k = 0; k < std::min(strategies.size(), spreads.size()); ++k) {
+    const LightStrategy& strategy = strategies[k];
+    const LightSpread& seen = spreads[k];
+    if (strategy.kind > LightStrategy::OnePunctual || !(seen.unshadowed > 0.0f)) continue;
+    const bool isOne = strategy.kind == LightStrategy::OnePunctual;
+    const std::size_t others = strategy.kind == LightStrategy::NearPunctual ? lights.directional() : 0;
+    const std::size_t first = isOne ? strategy.light : others;
+    const std::size_t end = std::min(isOne ? first + 1 : lights.size(), lights.groups());
+    // The second moment of what arrives: the mean square of a texel's samples.
+    const float arrived = std::min(seen.unshadowed, seen.variance + seen.mean * seen.mean);
+    for (std::size_t group = first; group < end; ++group) choice.learnt.record(group, seen.unshadowed, arrived);
+  }
+  choice.learnt.learn();
+  return choice;
+}
+
 }  // namespace lumel

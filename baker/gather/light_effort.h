@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "baker/light/direct_light.h"
 #include "baker/rays/lanes.h"
 
 namespace lumel {
@@ -50,6 +51,11 @@ inline bool isPilot(std::uint32_t sample) { return sample < kLightStretches.back
 /// all agreed keeps a small variance, since the next may be the first to differ. `all`: the strategies, and last the
 /// gather rays.
 int lightPower(std::span<const LightSpread> all, std::size_t strategy);
+
+/// Returns how hits near a wave's texels choose among punctual lights: by what the wave's own light samples have seen
+/// arrive. `strategies` and `spreads` as GatherWave::gather has them; empty: nothing is known.
+PunctualChoice punctualChoice(const PunctualLights& lights, std::span<const LightStrategy> strategies,
+                              std::span<const LightSpread> spreads);
 
 /// n * 2^power, rounded down.
 inline std::uint32_t scaledBy(int power, std::uint32_t n) { return power >= 0 ? n << power : n >> -power; }

@@ -104,15 +104,18 @@ Vec3 WarmWave::meanReflectance(const WarmAlbedos& albedos) const {
 }
 
 void WarmWave::warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts) {
+  PunctualChoice punctual = punctualChoice(wave_.scene.transport.punctual, {}, {});
   for (std::uint32_t s = 0; s < kWarmLights; ++s) {
     const ReceiverLanes receivers = wave_.points[s].receivers();
     wave_.lightSamples.setSampleOfAll(s);
-    counts.shadowRays += directLight(wave_.scene.transport, receivers, wave_.lightSamples, 0, TraceMode::Packet,
-                                     kGatherDensity, [&](int lane, const Vec3& wi, const Vec3& light) {
-                                       const auto l = static_cast<std::size_t>(lane);
-                                       const Vec3 flat = light * (glm::dot(wi, receivers.ns[l]) * kInvPi);
-                                       if (isFinite(flat)) texels[l].direct += flat / static_cast<float>(kWarmLights);
-                                     });
+    counts.shadowRays += directLight(
+        wave_.scene.transport, receivers, wave_.lightSamples, 0, TraceMode::Packet, kGatherDensity,
+        [&](int lane, const Vec3& wi, const Vec3& light) {
+          const auto l = static_cast<std::size_t>(lane);
+          const Vec3 flat = light * (glm::dot(wi, receivers.ns[l]) * kInvPi);
+          if (isFinite(flat)) texels[l].direct += flat / static_cast<float>(kWarmLights);
+        },
+        punctual.learnt.isUseful() ? &punctual : nullptr);
   }
 }
 
@@ -128,7 +131,8 @@ std::array<WarmTexel, kLanes> WarmWave::warmUp(std::span<CacheLink> links, Gathe
   warmDirect(texels, counts);
 
   WarmSink sink{texels, links};
-  GatherTracer tracer(wave_.scene.transport, wave_.scene.map, wave_.scene.reflectance, wave_.scene.lastDepth, sink);
+  GatherTracer tracer(wave_.scene.transport, wave_.scene.map, wave_.scene.reflectance, wave_.scene.lastDepth,
+                      punctualChoice(wave_.scene.transport.punctual, {}, {}), sink);
   SampleLanes samples = wave_.lightSamples;
   AimedRays rays;
   TexelMap::Lookup lookup;

@@ -90,6 +90,21 @@ void WavePoints::addTexel(const RayScene& rays, const Atlas& atlas, const TexelF
   LUMEL_CHECK(pieces_.size() > firstPiece_[lane]);
 }
 
+void WavePoints::boundsOf(std::size_t lane, Vec3& least, Vec3& most) const {
+  least = Vec3(std::numeric_limits<float>::max());
+  most = Vec3(std::numeric_limits<float>::lowest());
+  for (std::uint32_t i = firstPiece_[lane]; i < firstPiece_[lane + 1]; ++i) {
+    const Piece& piece = pieces_[i];
+    const Source& source = sources_[piece.source];
+    for (const Vec2& w : {piece.start, piece.start + piece.toSecond, piece.start + piece.toThird,
+                          piece.start + (piece.isSquare ? piece.toSecond + piece.toThird : piece.toSecond)}) {
+      const Vec3 p = source.p0 + w.x * source.e1 + w.y * source.e2;
+      least = glm::min(least, p);
+      most = glm::max(most, p);
+    }
+  }
+}
+
 void WavePoints::leaveOut(std::size_t lane) {
   active_[lane] = 0;
   setFrame(lane, {Vec3(0.0f), Vec3(0.0f), Vec3(0.0f)}, Vec3(0.0f));

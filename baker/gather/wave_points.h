@@ -43,6 +43,8 @@ class WavePoints {
   /// Covered area in texels; 0: nothing to sample.
   double area(std::size_t lane) const { return areas_[lane]; }
   bool covered(std::size_t lane) const { return active_[lane] != 0; }
+  /// Finds the corners of a box in the world about the covered part of a texel.
+  void boundsOf(std::size_t lane, Vec3& least, Vec3& most) const;
   /// From the next draw on the lane is without a texel.
   void leaveOut(std::size_t lane);
 

@@ -20,7 +20,8 @@ enum TexelPattern : std::uint32_t {
   kWarmDirection,
   kHits,
   kWarmHits,
-  kLightStretch
+  kLightStretch,
+  kNearLight  // and one more for each further light
 };
 
 struct WaveTexels {

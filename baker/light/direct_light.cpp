@@ -80,17 +80,21 @@ LUMEL_FOR_EACH_CPU void aimByCosine(const ReceiverLanes& receivers, const UnitSq
 
 std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& strategy, const ReceiverLanes& receivers,
                         const SampleLanes& samples, std::uint32_t patternBase, const SurfaceDensity& density,
-                        SampledLight& sampled, const EnvironmentLight::Places* sky) {
+                        SampledLight& sampled, const EnvironmentLight::Places* sky, PunctualChoice* punctual) {
   LightSampleLanes taken;
   switch (strategy.kind) {
     case LightStrategy::EveryPunctual:
-      transport.punctual.sample(receivers, samples.draw1D(patternBase + kPunctual), taken);
+      if (punctual != nullptr)
+        transport.punctual.sample(receivers, samples.draw1D(patternBase + kPunctual), punctual->learnt, taken,
+                                  punctual->group);
+      else
+        transport.punctual.sample(receivers, samples.draw1D(patternBase + kPunctual), taken);
       break;
     case LightStrategy::NearPunctual:
       transport.punctual.sampleNear(receivers, samples.draw1D(patternBase + kPunctual), taken);
       break;
     case LightStrategy::OnePunctual:
-      transport.punctual.sampleOne(strategy.light, receivers.p, taken);
+      transport.punctual.sampleOne(strategy.light, receivers, taken);
       break;
     case LightStrategy::Emissive:
       transport.emissive.sample(receivers.p, receivers.active, samples.draw1D(patternBase + kEmitter),
@@ -108,6 +112,16 @@ std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& st
                                    : aimShadows(receivers, taken, density, sampled);
   sampled.shadows.any = count > 0;
   return static_cast<std::uint64_t>(count);
+}
+
+void learn(const SampledLight& sampled, const ReceiverLanes& receivers, PunctualChoice& punctual) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (sampled.shadows.valid[lane] == 0) continue;
+    const float cosTheta = glm::dot(sampled.wi[lane], receivers.ns[lane]);
+    const float unshadowed = luminance(sampled.light[lane]) * cosTheta;
+    punctual.learnt.record(static_cast<std::size_t>(punctual.group[lane]), unshadowed,
+                           sampled.found(lane) ? unshadowed : 0.0f);
+  }
 }
 
 std::vector<LightStrategy> lightStrategies(const LightTransport& transport, bool separate) {

@@ -6,18 +6,11 @@
 #include <vector>
 
 #include "baker/light/light_transport.h"
+#include "baker/light/receiver.h"
 #include "baker/rays/sample_lanes.h"
 #include "baker/rays/sampling.h"
 
 namespace lumel {
-
-/// A point that receives light. Both normals lie on the side that light is gathered on.
-struct Receiver {
-  Vec3 p{0};
-  Vec3 ng{0, 0, 1};
-  Vec3 ns{0, 0, 1};
-  Vec3 rayStart{0};
-};
 
 /// The sample patterns that one receiver's decisions use, counted from a base.
 enum LightPattern : std::uint32_t { kPunctual, kEmitter, kEmitterPoint, kSun, kSky, kLightPatterns };
@@ -41,6 +34,7 @@ std::vector<LightStrategy> lightStrategies(const LightTransport& transport, bool
 struct LightLanes {
   LaneFlags active{};
   std::array<Receiver, kLanes> receivers;
+  const float* perReach2 = nullptr;  // ReceiverLanes
 };
 
 /// Sends a ray from every active receiver into the hemisphere about its shading normal. Density: cosTheta / pi. Those
@@ -56,26 +50,41 @@ struct SampledLight {
   bool found(std::size_t lane) const { return shadows.visible(static_cast<int>(lane)); }
 };
 
+/// What is learnt of punctual lights while samples are taken, and the groups of the lights that the lanes chose last.
+struct PunctualChoice {
+  LearntChoice learnt;
+  LaneFlags group{};
+};
+
 /// Takes one light sample by `strategy` for every active lane. `density` is the one with which the receivers gather
 /// from a direction, for multiple importance sampling against hits. Samples whose shadow rays are to be traced are set
 /// in `sampled.shadows`; returns their number. `sky` is what findSky() found for these samples, if that is known.
 std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& strategy, const ReceiverLanes& receivers,
                         const SampleLanes& samples, std::uint32_t patternBase, const SurfaceDensity& density,
-                        SampledLight& sampled, const EnvironmentLight::Places* sky = nullptr);
+                        SampledLight& sampled, const EnvironmentLight::Places* sky = nullptr,
+                        PunctualChoice* punctual = nullptr);
+
+/// Enters what became of samples of EveryPunctual.
+void learn(const SampledLight& sampled, const ReceiverLanes& receivers, PunctualChoice& punctual);
 
 /// One sample by each of the strategies that the scene needs: calls add(lane, wi, radianceOverPdf) for each that is
-/// visible. Returns the number of shadow rays.
+/// visible. Returns the number of shadow rays. `punctual`: how EveryPunctual chooses, and what learns from it; null: it
+/// chooses by unshadowed light.
 template <class Add>
 std::uint64_t directLight(const LightTransport& transport, const ReceiverLanes& receivers, const SampleLanes& samples,
-                          std::uint32_t patternBase, TraceMode mode, const SurfaceDensity& density, Add add) {
+                          std::uint32_t patternBase, TraceMode mode, const SurfaceDensity& density, Add add,
+                          PunctualChoice* punctual = nullptr) {
   std::uint64_t shadowRays = 0;
   SampledLight sampled;
   const auto take = [&](bool needed, LightStrategy::Kind kind) {
     if (!needed) return;
-    const std::uint64_t rays = takeLight(transport, {kind}, receivers, samples, patternBase, density, sampled);
+    PunctualChoice* choice = kind == LightStrategy::EveryPunctual ? punctual : nullptr;
+    const std::uint64_t rays =
+        takeLight(transport, {kind}, receivers, samples, patternBase, density, sampled, nullptr, choice);
     if (rays == 0) return;
     shadowRays += rays;
     transport.rays.occluded(sampled.shadows, mode);
+    if (choice != nullptr) learn(sampled, receivers, *choice);
     for (std::size_t lane = 0; lane < kLanes; ++lane)
       if (sampled.found(lane)) add(static_cast<int>(lane), sampled.wi[lane], sampled.light[lane]);
   };
@@ -88,7 +97,8 @@ std::uint64_t directLight(const LightTransport& transport, const ReceiverLanes& 
 
 template <class Add>
 std::uint64_t directLight(const LightTransport& transport, const LightLanes& lanes, const SampleLanes& samples,
-                          std::uint32_t patternBase, TraceMode mode, const SurfaceDensity& density, Add add) {
+                          std::uint32_t patternBase, TraceMode mode, const SurfaceDensity& density, Add add,
+                          PunctualChoice* punctual = nullptr) {
   Vec3Lanes p, ng, ns, rayStart;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     p.set(lane, lanes.receivers[lane].p);
@@ -96,8 +106,8 @@ std::uint64_t directLight(const LightTransport& transport, const LightLanes& lan
     ns.set(lane, lanes.receivers[lane].ns);
     rayStart.set(lane, lanes.receivers[lane].rayStart);
   }
-  return directLight(transport, ReceiverLanes{lanes.active, p, ng, ns, rayStart}, samples, patternBase, mode, density,
-                     add);
+  return directLight(transport, ReceiverLanes{lanes.active, p, ng, ns, rayStart, lanes.perReach2}, samples, patternBase,
+                     mode, density, add, punctual);
 }
 
 }  // namespace lumel

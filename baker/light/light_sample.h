@@ -13,6 +13,8 @@ struct ReceiverLanes {
   const Vec3Lanes& ns;
   const Vec3Lanes& rayStart;
   bool open = false;  // points in space: light arrives from all sides, and both normals are zero
+  /// Null, or by lane one over the square of the reach within which lights are taken as two (NearLight), 0 for none.
+  const float* perReach2 = nullptr;
 };
 
 /// One light sample of every lane as seen from its receiver, before visibility.

@@ -9,10 +9,6 @@
 
 namespace lumel {
 
-/// The most hits of a path that is followed ray by ray, where bounces have no end of their own; Russian roulette ends
-/// paths well before.
-inline constexpr int kLongestPath = 64;
-
 /// What the scene lacks is empty and costs nothing.
 struct LightTransport {
   const RayScene& rays;

@@ -106,6 +106,8 @@ PunctualLights::PunctualLights(const std::vector<Light>& lights) {
       if (sends(light) && (light.type == LightType::Directional) == directional) lights_.emplace_back(light);
     if (directional) directional_ = lights_.size();
   }
+  for (std::size_t i = directional_; i < lights_.size(); ++i) byX_.push_back(static_cast<std::uint32_t>(i));
+  std::ranges::stable_sort(byX_, {}, [&](std::uint32_t light) { return lights_[light].position.x; });
   if (lights_.size() - directional_ <= kLocalLights) return;
   std::vector<LightBounds> bounds(lights_.size());  // those of directional lights stay without power
   std::size_t i = directional_;
@@ -114,9 +116,22 @@ PunctualLights::PunctualLights(const std::vector<Light>& lights) {
   tree_ = LightTree(bounds);
 }
 
-void PunctualLights::sampleOne(std::size_t index, const Vec3Lanes& p, LightSampleLanes& samples) const {
+/// Leaves the bounded one of the two lights that a light within reach is taken as (NearLight).
+static void boundNearLight(const ReceiverLanes& at, LightSampleLanes& samples) {
+  if (at.perReach2 == nullptr) return;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (samples.distant[lane] || !(at.perReach2[lane] > 0.0f)) continue;
+    const Vec3 toLight = samples.target[lane] - at.p[lane];
+    samples.weight.set(lane, samples.weight[lane] * std::min(1.0f, glm::dot(toLight, toLight) * at.perReach2[lane]));
+  }
+}
+
+void PunctualLights::sampleOne(std::size_t index, const ReceiverLanes& at, LightSampleLanes& samples) const {
   const Source& light = lights_[index];
-  if (!light.distant) return sampleNearby(light, p, samples);
+  if (!light.distant) {
+    sampleNearby(light, at.p, samples);
+    return boundNearLight(at, samples);
+  }
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     samples.wi.set(lane, -light.direction);
     samples.weight.set(lane, light.power);
@@ -220,47 +235,89 @@ void PunctualLights::choose(std::size_t first, const ReceiverLanes& at, const Un
     chooseAmongFew(std::span(lights_).subspan(first), at, u, chosen);
     for (int& light : chosen.light) light += static_cast<int>(first);
   } else {
-    chooseWithTree(first, at, u, chosen);
+    chooseWithTree(first, at, u, nullptr, chosen);
   }
+  sampleChosen(chosen, at, samples);
+}
+
+void PunctualLights::sample(const ReceiverLanes& at, const UnitLanes& u, const LearntChoice& learnt,
+                            LightSampleLanes& samples, LaneFlags& chosenGroup) const {
+  Chosen chosen;
+  chooseWithTree(0, at, u, &learnt, chosen);
+  const int last = static_cast<int>(groups()) - 1;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) chosenGroup[lane] = std::min(chosen.light[lane], last);
+  sampleChosen(chosen, at, samples);
+}
+
+void PunctualLights::sampleChosen(Chosen& chosen, const ReceiverLanes& at, LightSampleLanes& samples) const {
   for (std::size_t lane = 0; lane < kLanes; ++lane)
     chosen.set(lane, lights_[static_cast<std::size_t>(chosen.light[lane])]);
   sampleChosen(chosen, at.p, samples);
+  boundNearLight(at, samples);
+}
+
+std::vector<std::size_t> PunctualLights::around(const Vec3& p, float distance) const {
+  std::vector<std::size_t> found;
+  const auto xOf = [&](std::uint32_t light) { return lights_[light].position.x; };
+  auto light = std::ranges::lower_bound(byX_, p.x - distance, {}, xOf);
+  for (; light != byX_.end() && xOf(*light) <= p.x + distance; ++light) {
+    const Vec3 to = lights_[*light].position - p;
+    if (glm::dot(to, to) <= distance * distance) found.push_back(*light);
+  }
+  std::ranges::sort(found);
+  return found;
+}
+
+/// Chooses among groups by what each would bring, and as LearntChoice says if it is given. Returns the group, or their
+/// number where none brings anything. `u` becomes what is left of it within the group.
+std::size_t PunctualLights::chooseGroup(std::span<const float> unshadowed, const LearntChoice* learnt, float& u,
+                                        float& probability) const {
+  float whole = 0.0f, total = 0.0f, possible = 0.0f;
+  for (std::size_t g = 0; g < unshadowed.size(); ++g) {
+    whole += unshadowed[g];
+    total += unshadowed[g] * (learnt ? learnt->factor(g) : 1.0f);
+    possible += unshadowed[g] > 0.0f ? 1.0f : 0.0f;
+  }
+  const float even = learnt == nullptr ? 0.0f : total > 0.0f ? learnt->evenShare(total / whole) : 1.0f;
+  const float perTotal = total > 0.0f ? (1.0f - even) / total : 0.0f;
+  const float each = possible > 0.0f ? even / possible : 0.0f;
+  float before = 0.0f, here = 0.0f;
+  std::size_t chosen = unshadowed.size();
+  for (std::size_t g = 0; g < unshadowed.size() && !(chosen < unshadowed.size() && u < before + here); ++g) {
+    if (!(unshadowed[g] > 0.0f)) continue;
+    const float share = unshadowed[g] * (learnt ? learnt->factor(g) : 1.0f) * perTotal + each;
+    if (!(share > 0.0f)) continue;
+    chosen = g;
+    before += here;
+    here = share;
+  }
+  probability = here;
+  if (here > 0.0f) u = std::clamp((u - before) / here, 0.0f, 0x1.fffffep-1f);
+  return chosen;
 }
 
 /// Chooses among any number of lights: those that the tree does not hold are asked one by one, and the tree counts as
 /// one more.
 void PunctualLights::chooseWithTree(std::size_t first, const ReceiverLanes& at, const UnitLanes& u,
-                                    Chosen& chosen) const {
+                                    const LearntChoice* learnt, Chosen& chosen) const {
   const std::size_t end = tree_.empty() ? lights_.size() : directional_;
   LaneFlags toTree = at.active;
   UnitLanes uTree = u;
   std::array<float, kLanes> treeShare;
   treeShare.fill(1.0f);
-  std::vector<float> importances(end - first);
+  std::vector<float> unshadowed(end - first + (tree_.empty() ? 0 : 1));
   for (std::size_t lane = 0; lane < kLanes && first < end; ++lane) {
     if (!at.active[lane]) continue;
     const Vec3 p = at.p[lane], n = at.ns[lane];
-    const float treeImportance = tree_.importance({p, n});
-    float total = treeImportance;
-    for (std::size_t i = first; i < end; ++i) total += importances[i - first] = importance(i, p, n);
-    const float threshold = u.u[lane] * total;
-    float before = 0.0f;
-    std::size_t last = end;
-    for (std::size_t i = first; i < end && !(last < end && threshold < before); ++i) {
-      if (!(importances[i - first] > 0.0f)) continue;
-      last = i;
-      before += importances[i - first];
-    }
-    if (last < end && (threshold < before || !(treeImportance > 0.0f))) {
-      toTree[lane] = 0;
-      chosen.light[lane] = static_cast<int>(last);
-      chosen.probability[lane] = importances[last - first] / total;
-    } else if (treeImportance > 0.0f) {
-      uTree.u[lane] = std::clamp((threshold - before) / treeImportance, 0.0f, 0x1.fffffep-1f);
-      treeShare[lane] = treeImportance / total;
-    } else {
-      toTree[lane] = 0;
-    }
+    for (std::size_t i = first; i < end; ++i) unshadowed[i - first] = importance(i, p, n);
+    if (!tree_.empty()) unshadowed.back() = tree_.importance({p, n});
+    float probability = 0.0f;
+    const std::size_t group = chooseGroup(unshadowed, learnt, uTree.u[lane], probability);
+    treeShare[lane] = probability;
+    toTree[lane] = group == end - first && probability > 0.0f ? 1 : 0;
+    if (group >= end - first) continue;
+    chosen.light[lane] = static_cast<int>(first + group);
+    chosen.probability[lane] = probability;
   }
   if (tree_.empty()) return;
   LightTree::Descent descent;

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "baker/light/learnt_choice.h"
 #include "baker/light/light_sample.h"
 #include "baker/light/light_tree.h"
 #include "baker/rays/lanes.h"
@@ -29,12 +30,21 @@ class PunctualLights {
   void sample(const ReceiverLanes& at, const UnitLanes& u, LightSampleLanes& samples) const {
     choose(0, at, u, samples);
   }
+  /// Lights that a LearntChoice tells apart: each by itself where there are at most kLocalLights; else each directional
+  /// one, and all others as one group.
+  std::size_t groups() const { return tree_.empty() ? lights_.size() : directional_ + 1; }
+  /// Samples as above, but chooses the group as `learnt` says. `chosen` becomes the group of each lane's light.
+  void sample(const ReceiverLanes& at, const UnitLanes& u, const LearntChoice& learnt, LightSampleLanes& samples,
+              LaneFlags& chosen) const;
   /// Samples as above, without the directional lights.
   void sampleNear(const ReceiverLanes& at, const UnitLanes& u, LightSampleLanes& samples) const {
     choose(directional_, at, u, samples);
   }
   /// Samples light `index` without a choice.
-  void sampleOne(std::size_t index, const Vec3Lanes& p, LightSampleLanes& samples) const;
+  void sampleOne(std::size_t index, const ReceiverLanes& at, LightSampleLanes& samples) const;
+
+  /// Returns the lights with a place within `distance` of p, in their order.
+  std::vector<std::size_t> around(const Vec3& p, float distance) const;
 
   static constexpr std::size_t kLocalLights = 32;
 
@@ -52,19 +62,25 @@ class PunctualLights {
     float cosOuter = -2.0f;
     float perCone = 1.0f;
   };
+  const Source& source(std::size_t index) const { return lights_[index]; }
 
  private:
   /// Holds the lights that the lanes chose, and the probability of each choice.
   struct Chosen;
   void choose(std::size_t first, const ReceiverLanes& at, const UnitLanes& u, LightSampleLanes& samples) const;
-  void chooseWithTree(std::size_t first, const ReceiverLanes& at, const UnitLanes& u, Chosen& chosen) const;
+  void chooseWithTree(std::size_t first, const ReceiverLanes& at, const UnitLanes& u, const LearntChoice* learnt,
+                      Chosen& chosen) const;
+  std::size_t chooseGroup(std::span<const float> unshadowed, const LearntChoice* learnt, float& u,
+                          float& probability) const;
+  void sampleChosen(Chosen& chosen, const ReceiverLanes& at, LightSampleLanes& samples) const;
   static void chooseAmongFew(std::span<const Source> few, const ReceiverLanes& at, const UnitLanes& u, Chosen& chosen);
   static void sampleChosen(const Chosen& chosen, const Vec3Lanes& p, LightSampleLanes& samples);
   float importance(std::size_t light, const Vec3& p, const Vec3& n) const;
 
   std::vector<Source> lights_;
   std::size_t directional_ = 0;
-  LightTree tree_;  // over lights_, only with more than kLocalLights that are not directional
+  std::vector<std::uint32_t> byX_;  // lights with a place, by their x
+  LightTree tree_;                  // over lights_, only with more than kLocalLights that are not directional
 };
 
 /// Returns the irradiance that a punctual light brings to a surface at p that faces it: colour * candela / d^2 with the

@@ -1,8 +1,10 @@
 #include "baker/path/path_integrator.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "baker/light/direct_light.h"
+#include "baker/light/near_lights.h"
 #include "baker/rays/sampling.h"
 #include "baker/rays/stratified_net.h"
 
@@ -17,6 +19,21 @@ constexpr std::uint32_t kFootprint = kLightPatterns;
 constexpr std::uint32_t kDirection = kLightPatterns + 1;
 constexpr std::uint32_t kRoulette = kLightPatterns + 2;
 constexpr std::uint32_t kPatternsPerReceiver = kLightPatterns + 4;
+/// The patterns of near lights follow those of all receivers.
+constexpr std::uint32_t kNear = 0x80000000u;
+
+/// Lights are chosen by what a pilot of at most so many samples has seen, and from these samples on again by all
+/// before.
+constexpr std::uint32_t kMostPilotSamples = 8;
+constexpr std::array<std::uint32_t, 2> kStretches = {64, 1024};
+/// Names the pilot where a stretch is named by its first sample.
+constexpr std::uint32_t kPilot = 1;
+
+bool isStretchStart(std::uint32_t sample) { return std::ranges::find(kStretches, sample) != kStretches.end(); }
+std::uint32_t stretchEnd(std::uint32_t sample) {
+  const auto next = std::ranges::upper_bound(kStretches, sample);
+  return next != kStretches.end() ? *next : std::numeric_limits<std::uint32_t>::max();
+}
 
 /// Holds the state of one sample's path in one lane.
 struct Path {
@@ -27,6 +44,7 @@ struct Path {
   Vec3 radiance{0};  // what the gather ray has brought back so far
   Vec3 origin{0};    // of the ray in flight: the surface point, before its offset
   float pdf = 0.0f;  // density of the ray in flight's direction
+  int losslessHits = 0;
   SampleValue value;
   std::array<Vec3, kProbeNormals> probes{};
 };
@@ -34,23 +52,30 @@ struct Path {
 class WaveTracer {
  public:
   WaveTracer(const LightTransport& transport, const Encoding& encoding, const Atlas& atlas, const PathOptions& options)
-      : transport_(transport), encoding_(encoding), atlas_(atlas), options_(options) {}
+      : transport_(transport), encoding_(encoding), atlas_(atlas), options_(options) {
+    for (PunctualChoice& choice : punctual_) choice.learnt = LearntChoice(transport.punctual.groups());
+  }
 
   WaveResult run(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count);
 
  private:
   void startTexels(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count);
+  void runPilot(std::uint32_t samples);
+  void startStretch(std::uint32_t first);
   void startSample();
   void lightTexels();
+  void lightFromNear();
   void followPaths();
   void findHits(int depth);
   bool shadeHit(int lane, int depth);
-  void endDarkPaths(int depth);
+  void playRoulette(int depth);
   bool scatter(int depth);
   void launch(int lane, const Receiver& receiver, const Vec3& dirWorld, float pdf);
   void addLight(int lane, const Vec3& dirTangent, const Vec3& radianceOverPdf);
   void finishSample();
-  Receiver receiverAt(const SurfacePoint& point) const;
+  /// Tells whether there are lights to choose among by what they were seen to bring. Else all samples are one stretch.
+  bool learns() const { return punctual_[0].learnt.isUseful(); }
+  PunctualChoice* choiceAt(bool texel) { return learns() ? &punctual_[texel ? 0 : 1] : nullptr; }
   /// Tells whether what shines by itself does not count for a ray.
   bool leavesOut(int depth) const { return depth == 0 && options_.indirectOnly; }
 
@@ -63,11 +88,15 @@ class WaveTracer {
   std::array<TexelCoord, kLanes> coords_;
   std::array<TexelFootprint, kLanes> footprints_;
   std::array<bool, kLanes> covered_{};
+  std::array<std::vector<NearLight>, kLanes> near_;
+  alignas(64) std::array<float, kLanes> perReach2_{};
+  bool anyNear_ = false;
   LightLanes lanes_;  // receivers of the light that is sampled next
   std::array<Path, kLanes> paths_;
   std::array<TexelSampler, kLanes> samplers_;
   SampleLanes samples_;
   NetLanes net_;
+  std::array<PunctualChoice, 2> punctual_;  // at texels, and at hits
   RayPacket rays_;
   std::array<HitSurface, kLanes> hits_;
   WaveResult result_;
@@ -76,8 +105,10 @@ class WaveTracer {
 WaveResult WaveTracer::run(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count) {
   startTexels(pageIndex, page, first, count);
   const auto samples = static_cast<std::uint32_t>(options_.samples);
+  if (learns()) runPilot(samples);
   for (std::uint32_t begin = 0; begin < samples;) {
-    const NetRange range = netAt(begin, samples);
+    if (learns() && isStretchStart(begin)) startStretch(begin);
+    const NetRange range = netAt(begin, learns() ? std::min(samples, stretchEnd(begin)) : samples);
     net_.fill(samplers_, covered_, range, kDirection);
     for (std::uint32_t step = 0; step < range.count(); ++step) {
       for (std::size_t lane = 0; lane < kLanes; ++lane)
@@ -101,31 +132,38 @@ void WaveTracer::startTexels(std::uint32_t pageIndex, const PageTexels& page, st
     texel.coverage = static_cast<float>(std::min(area, 1.0));
     texel.probed = (first + lane) % kProbeStride == 0;
     covered_[lane] = area > 0.0;
+    NearLights near = nearLightsOf(transport_.punctual, footprints_[lane]);
+    near_[lane] = std::move(near.lights);
+    perReach2_[lane] = near.perReach2;
+    anyNear_ = anyNear_ || near.perReach2 > 0.0f;
     samplers_[lane] = TexelSampler(options_.seed, pageIndex, coords_[lane].x, coords_[lane].y);
     samples_.setTexel(static_cast<int>(lane), samplers_[lane]);
   }
 }
 
-/// Makes a receiver of a point as WavePoints does for the gather: on round things its rays start over the facet.
-Receiver WaveTracer::receiverAt(const SurfacePoint& point) const {
-  const Surface& surface = atlas_.surfaces[point.triangle.surface];
-  const std::uint32_t* corner = surface.indices.data() + std::size_t{3} * point.triangle.triangle;
-  std::array<Vec3, 3> corners, normals;
-  for (std::size_t i = 0; i < 3; ++i) {
-    corners[i] = surface.positions[corner[i]];
-    normals[i] = surface.normals[corner[i]];
+/// Takes samples that only teach which lights arrive, and that are not part of the result.
+void WaveTracer::runPilot(std::uint32_t samples) {
+  startStretch(kPilot);
+  for (std::uint32_t i = 0; i < std::clamp(samples / 8, 1u, kMostPilotSamples); ++i) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) samples_.setSample(static_cast<int>(lane), i);
+    startSample();
+    if (!options_.indirectOnly) lightTexels();
+    followPaths();
   }
-  const float translation = transport_.rays.translationOf(surface.instance);
-  Receiver receiver{point.position, point.geometricNormal, point.frame.n,
-                    offsetPoint(point.position, point.geometricNormal, corners, translation)};
-  const Vec3 e1 = corners[1] - corners[0], e2 = corners[2] - corners[0];
-  if (!isRounded(receiver.ng, e1, e2, normals)) return receiver;
-  const Vec3 lift =
-      liftToRound(point.position - corners[0], e1, e2, {point.barycentric.y, point.barycentric.z}, normals);
-  if (!isLifted(lift, receiver.ng, offsetDistance(corners, translation))) return receiver;
-  receiver.rayStart += lift;
-  receiver.ng = receiver.ns;
-  return receiver;
+  for (TexelResult& texel : result_.texels) texel.sums = {};
+  result_.cutPaths = 0;
+  startStretch(0);
+}
+
+/// From sample `first` on lights are chosen by what was seen before, and samples have scrambles of their own: a choice
+/// that depended on samples of a sequence would lean, because the sequence evades its own earlier points.
+void WaveTracer::startStretch(std::uint32_t first) {
+  for (PunctualChoice& choice : punctual_) choice.learnt.learn();
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    samplers_[lane] =
+        TexelSampler(options_.seed + (std::uint64_t{first} << 32), page_, coords_[lane].x, coords_[lane].y);
+    samples_.setTexel(static_cast<int>(lane), samplers_[lane]);
+  }
 }
 
 void WaveTracer::startSample() {
@@ -140,7 +178,7 @@ void WaveTracer::startSample() {
     path = Path{};
     path.frame = point.frame;
     Receiver& receiver = lanes_.receivers[lane];
-    receiver = receiverAt(point);
+    receiver = receiverAt(transport_.rays, atlas_, point);
     path.gatherTangent = sampleGatherHemisphere(direction[static_cast<int>(lane)]);
     path.gatherPdf = gatherHemispherePdf(path.gatherTangent.z);
     const Vec3 dirWorld = path.frame.fromLocal(path.gatherTangent);
@@ -170,11 +208,35 @@ void WaveTracer::addLight(int lane, const Vec3& dirTangent, const Vec3& radiance
       path.probes[i] += light * std::max(0.0f, glm::dot(dirTangent, probeNormals()[i]));
 }
 
+/// Adds the peaks of lights that lie close to a texel, which samples at its points leave out (NearLight).
+void WaveTracer::lightFromNear() {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const int l = static_cast<int>(lane);
+    const std::uint32_t sample = samples_.sample(l);
+    for (std::size_t k = 0; k < near_[lane].size(); ++k) {
+      const NearSample near = sampleNear(transport_, atlas_, footprints_[lane], near_[lane][k],
+                                         samplers_[lane].get2D(sample, kNear + static_cast<std::uint32_t>(k)));
+      if (near.light == Vec3(0.0f)) continue;
+      ShadowPacket shadow;
+      shadow.clear();
+      shadow.set(l, near.receiver.rayStart, near.position - near.receiver.rayStart, 1.0f);
+      transport_.rays.occluded(shadow, TraceMode::Packet);
+      ++result_.shadowRays;
+      if (shadow.visible(l)) addLight(l, near.frame.toLocal(near.wi), near.light);
+    }
+  }
+}
+
 void WaveTracer::lightTexels() {
-  result_.shadowRays += directLight(transport_, lanes_, samples_, 0, TraceMode::Packet, kGatherDensity,
-                                    [&](int lane, const Vec3& wi, const Vec3& light) {
-                                      addLight(lane, paths_[static_cast<std::size_t>(lane)].frame.toLocal(wi), light);
-                                    });
+  lanes_.perReach2 = anyNear_ ? perReach2_.data() : nullptr;
+  result_.shadowRays += directLight(
+      transport_, lanes_, samples_, 0, TraceMode::Packet, kGatherDensity,
+      [&](int lane, const Vec3& wi, const Vec3& light) {
+        addLight(lane, paths_[static_cast<std::size_t>(lane)].frame.toLocal(wi), light);
+      },
+      choiceAt(true));
+  lanes_.perReach2 = nullptr;
+  if (anyNear_) lightFromNear();
 }
 
 void WaveTracer::followPaths() {
@@ -183,16 +245,17 @@ void WaveTracer::followPaths() {
     findHits(depth);
     for (int lane = 0; lane < kLanes; ++lane)
       lanes_.active[static_cast<std::size_t>(lane)] = rays_.valid[lane] != 0 && shadeHit(lane, depth);
-    if (depth >= kRouletteAfter) endDarkPaths(depth);
+    if (depth >= kRouletteAfter) playRoulette(depth);
     if (std::none_of(lanes_.active.begin(), lanes_.active.end(), [](bool active) { return active; })) break;
     const std::uint32_t pattern = static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver;
-    result_.shadowRays += directLight(transport_, lanes_, samples_, pattern, TraceMode::Packet, kCosineDensity,
-                                      [&](int lane, const Vec3& wi, const Vec3& light) {
-                                        Path& path = paths_[static_cast<std::size_t>(lane)];
-                                        const float cosTheta =
-                                            glm::dot(wi, lanes_.receivers[static_cast<std::size_t>(lane)].ns);
-                                        path.radiance += path.beta * light * (cosTheta * kInvPi);
-                                      });
+    result_.shadowRays += directLight(
+        transport_, lanes_, samples_, pattern, TraceMode::Packet, kCosineDensity,
+        [&](int lane, const Vec3& wi, const Vec3& light) {
+          Path& path = paths_[static_cast<std::size_t>(lane)];
+          const float cosTheta = glm::dot(wi, lanes_.receivers[static_cast<std::size_t>(lane)].ns);
+          path.radiance += path.beta * light * (cosTheta * kInvPi);
+        },
+        choiceAt(false));
     // The last ray of a path only looks for what shines by itself.
     if (depth + 1 == options_.bounces && !transport_.raysSeeLight()) break;
     if (!scatter(depth)) break;
@@ -232,15 +295,21 @@ bool WaveTracer::shadeHit(int lane, int depth) {
   return true;
 }
 
-/// Ends paths by Russian roulette: a path that goes on stands for those that ended.
-void WaveTracer::endDarkPaths(int depth) {
+/// Ends paths by Russian roulette, with the throughput as the chance to go on: a path that goes on stands for those
+/// that ended. The throughput is 1 afterwards, so from then on a hit of albedo rho ends a share 1 - rho. (Ending more
+/// would make the variance of a sum over k hits grow as rho^2k / survival^k.)
+void WaveTracer::playRoulette(int depth) {
   const UnitLanes roulette = samples_.draw1D(static_cast<std::uint32_t>(depth + 1) * kPatternsPerReceiver + kRoulette);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     if (!lanes_.active[lane]) continue;
-    Vec3& beta = paths_[lane].beta;
+    Path& path = paths_[lane];
+    Vec3& beta = path.beta;
     const float survival = std::clamp(std::max({beta.x, beta.y, beta.z}), 0.05f, 1.0f);
     lanes_.active[lane] = roulette.u[lane] < survival;
     beta /= survival;
+    if (survival < 1.0f || options_.bounces >= 0 || ++path.losslessHits < kMostLosslessHits) continue;
+    lanes_.active[lane] = 0;
+    ++result_.cutPaths;
   }
 }
 
@@ -292,9 +361,7 @@ void WaveTracer::finishSample() {
 
 PathIntegrator::PathIntegrator(const LightTransport& transport, const Encoding& encoding, const Atlas& atlas,
                                const PathOptions& options)
-    : transport_(transport), encoding_(encoding), atlas_(atlas), options_(options) {
-  if (options_.bounces < 0) options_.bounces = kLongestPath;
-}
+    : transport_(transport), encoding_(encoding), atlas_(atlas), options_(options) {}
 
 WaveResult PathIntegrator::bakeWave(std::uint32_t pageIndex, const PageTexels& page, std::size_t first,
                                     std::size_t count) const {

@@ -18,10 +18,15 @@ namespace lumel {
 
 struct PathOptions {
   int samples = 1;
-  int bounces = 0;  // -1: all that matter, up to kLongestPath
+  int bounces = 0;  // -1: all
   bool indirectOnly = false;
   std::uint64_t seed = 1;
 };
+
+/// Without a number of bounces Russian roulette alone ends paths, so the estimate is unbiased wherever albedo is
+/// below 1. Light between surfaces of albedo 1 never dies: a path is cut off after so many hits that take nothing from
+/// it, and is counted (WaveResult::cutPaths).
+inline constexpr int kMostLosslessHits = 4096;
 
 /// Stores the result of a path-traced texel.
 struct TexelResult {
@@ -36,6 +41,7 @@ struct WaveResult {
   std::array<TexelResult, kLanes> texels;
   std::uint64_t rays = 0;
   std::uint64_t shadowRays = 0;
+  std::uint64_t cutPaths = 0;  // ended by force (kMostLosslessHits): what they would have found is missing
   std::vector<NonFiniteSample> nonFinite;
 };
 

@@ -85,6 +85,10 @@ class TexelFootprint {
   /// a piece). Precondition: area() > 0.
   SurfacePoint sample(Vec2 u) const;
 
+  /// Returns the point of a piece's triangle, with weights of its source's vertices 1 and 2 as the pieces' corners
+  /// have.
+  SurfacePoint at(std::size_t piece, Vec2 barycentric) const { return pointOn(pieces_[piece], barycentric); }
+
   /// Area-weighted mean of the covered part, moved onto the nearest piece if it falls outside: one representative
   /// point for single-ray work and for reports.
   SurfacePoint centroid() const;

@@ -262,6 +262,59 @@ TEST(PunctualLights, ManyLightsAgreeWithTheSum) {
   }
 }
 
+// Whatever was learnt, the mean over u is the sum over all lights, those that never arrived included; and a sun that
+// was seen to be hidden gets the even share alone.
+TEST(PunctualLights, LearntChoicesLeaveNoLightOut) {
+  Random random(9);
+  for (const int count : {3, 20, 60}) {
+    std::vector<Light> lights;
+    for (int i = 0; i < count; ++i) {
+      lights.push_back(randomLight(random, i == 1 || i == 5 ? 3 : 0));
+      lights.back().position.y = 0.5f + std::abs(lights.back().position.y);
+    }
+    lights[1].intensity = 1e4f;
+    lights[1].direction = {0, -1, 0};
+    const PunctualLights all(lights);
+    LearntChoice learnt(all.groups());
+    ASSERT_TRUE(learnt.isUseful());
+    for (std::size_t g = 0; g < all.groups(); ++g) learnt.record(g, 2.0f, g % 3 == 2 ? 2.0f : 0.0f);
+    for (std::size_t g = 0; g < all.groups(); ++g) learnt.record(g, 6.0f, 0.0f);
+    learnt.learn();
+    const Vec3 p(0.1f, 0.0f, -0.3f), n(0, 1, 0);
+    double truth = 0;
+    for (const Light& light : lights) {
+      Vec3 wi(0.0f);
+      const Vec3 facing = facingIrradiance(light, p, wi);
+      truth += static_cast<double>(facing.x * std::max(0.0f, glm::dot(wi, n)));
+    }
+    LaneFlags active, groups;
+    active.fill(1);
+    Vec3Lanes points, normals;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      points.set(lane, p);
+      normals.set(lane, n);
+    }
+    constexpr int kGrid = 1 << 16;
+    double sum = 0;
+    std::vector<int> taken(all.groups());
+    for (int i = 0; i < kGrid; i += kLanes) {
+      UnitLanes u;
+      for (int lane = 0; lane < kLanes; ++lane) u.u[lane] = (static_cast<float>(i + lane) + 0.5f) / kGrid;
+      LightSampleLanes samples;
+      all.sample({active, points, normals, normals, points}, u, learnt, samples, groups);
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        sum += static_cast<double>(samples.weight.x[lane] * std::max(0.0f, glm::dot(samples.wi[lane], n))) / kGrid;
+        ++taken[static_cast<std::size_t>(groups[lane])];
+      }
+    }
+    // A light's share of u is met to one step of the grid of 65536, and the least share is .1 / 60 of it.
+    EXPECT_NEAR(sum / truth, 1.0, 0.01) << count;
+    // The sun is the first light and was never seen to arrive.
+    EXPECT_LT(taken[0], 0.11 * kGrid) << count;
+    EXPECT_GT(taken[0], 0) << count;
+  }
+}
+
 TEST(PunctualLights, ManyDegenerate) {
   Light light;
   light.position = {0, 1, 0};

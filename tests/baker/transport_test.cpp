@@ -295,5 +295,77 @@ TEST(Transport, Interrupted) {
   EXPECT_EQ(result.error().kind, ErrorKind::Interrupted);
 }
 
+Light sunOf(const Vec3& direction, float lux) {
+  Light sun;
+  sun.type = LightType::Directional;
+  sun.direction = glm::normalize(direction);
+  sun.intensity = lux;
+  return sun;
+}
+
+Light lampAt(const Vec3& position, float candela) {
+  Light lamp;
+  lamp.position = position;
+  lamp.intensity = candela;
+  return lamp;
+}
+
+/// The RMS difference of two seeds over a page, relative to its mean, and that mean.
+std::pair<double, double> noiseOf(const TestScene& test, BakeOptions options) {
+  options.seed = 1;
+  const BakeResult one = test.bake(options);
+  options.seed = 2;
+  const BakeResult two = test.bake(options);
+  double squares = 0, sum = 0, count = 0;
+  for (std::size_t p = 0; p < one.pages.size(); ++p)
+    for (std::size_t i = 0; i < one.pages[p].flat.pixels.size(); ++i) {
+      const auto a = static_cast<double>(one.pages[p].flat.pixels[i]);
+      const auto b = static_cast<double>(two.pages[p].flat.pixels[i]);
+      squares += 0.5 * (a - b) * (a - b);
+      sum += 0.5 * (a + b);
+      count += 1;
+    }
+  return {std::sqrt(squares / count) / (sum / count), sum / count};
+}
+
+// Lamps in a closed room: a sun outside that is a thousand times as strong changes neither light nor noise.
+TEST(Transport, ASunOutsideCostsNothing) {
+  TestScene test;
+  test.addRoom({0, 0, 0}, {4, 3, 4}, {.material = test.addMaterial(Vec3(0.5f)), .texels = 8});
+  test.scene.lights = {lampAt({1, 2.5f, 1}, 100), lampAt({3, 2, 2}, 100), lampAt({2, 1, 3.2f}, 100)};
+  const BakeOptions options{.samples = 64, .bounces = 4};
+  const auto [noise, mean] = noiseOf(test, options);
+  test.scene.lights.push_back(sunOf({0.3f, -1, 0.2f}, 1e5f));
+  const auto [noiseBySun, meanBySun] = noiseOf(test, options);
+  std::printf("noise without a sun %.4f, with it %.4f\n", noise, noiseBySun);
+  // A tenth of the samples still asks for the sun: 5% more noise. What it was by unshadowed light: 20 times as much.
+  EXPECT_LT(noiseBySun, 1.25 * noise);
+  EXPECT_NEAR(meanBySun / mean, 1.0, 0.01);
+}
+
+// The floor is half under a roof with a lamp beneath it and half under the sun: what was learnt from the one half must
+// not cost the other its light.
+TEST(Transport, LearntChoicesAreUnbiased) {
+  TestScene test;
+  const int page = test.addRectangle({-2, 0, 2}, {4, 0, 0}, {0, 0, -4}, {.texels = 8});
+  test.addRectangle({-20, 1, -20}, {20, 0, 0}, {0, 0, 40}, {.material = test.addMaterial(Vec3(0.0f)), .texels = 0});
+  const Light sun = sunOf({0, -1, 0}, 30.0f), lamp = lampAt({-1, 0.8f, 0}, 2.0f), other = lampAt({0.5f, 0.9f, 1}, 1.0f);
+  test.scene.lights = {sun, lamp, other};
+  std::array<Vec3d, 4> axes;
+  for (int i = 0; i < 4; ++i) axes[static_cast<std::size_t>(i)] = axisInWorld(test, page, i - 1);
+  expectAgreement(deviation(test, {.samples = 256, .bounces = 0}, page, [&](const Vec3d& p) {
+    Maps maps{};
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (p.x > 0) maps[i] += 30.0 / std::numbers::pi * axes[i].y;
+      for (const Light& light : {lamp, other}) {
+        const Vec3d d = Vec3d(light.position) - p;
+        maps[i] += static_cast<double>(light.intensity) / glm::dot(d, d) / std::numbers::pi *
+                   std::max(0.0, glm::dot(glm::normalize(d), axes[i]));
+      }
+    }
+    return maps;
+  }));
+}
+
 }  // namespace
 }  // namespace lumel
