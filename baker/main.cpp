@@ -16,6 +16,8 @@ int exitCode(lumel::ErrorKind kind) {
       return 2;
     case lumel::ErrorKind::Input:
       return 3;
+    case lumel::ErrorKind::Threshold:
+      return 4;
     case lumel::ErrorKind::Interrupted:
       return 130;
   }

@@ -86,15 +86,25 @@ struct Material {
   AlphaMode alphaMode = AlphaMode::Opaque;
   float alphaCutoff = 0.5f;
   bool doubleSided = false;
-  bool unlit = false;  // KHR_materials_unlit: shown as it is, gets no lightmap, reflects as a diffuse surface
+  float transmission = 0.0f;  // KHR_materials_transmission: share of light that passes, times the base colour; the
+                              // surface is thin, light goes straight on
+  bool unlit = false;         // KHR_materials_unlit: shown as it is, gets no lightmap, reflects as a diffuse surface
 };
 
 /// An image as the file holds it, decoded only when something needs its pixels (decodeTexture).
 struct ImageSource {
   std::string name;                   // for messages: file name or "image 3"
   std::string mimeType;               // "image/png", "image/jpeg", "image/webp", ... ; empty if unknown
-  std::vector<std::uint8_t> encoded;  // empty: missing (a warning was given; factors apply alone)
+  std::vector<std::uint8_t> encoded;  // empty: missing (a warning was given)
 };
+
+/// Stands for a base colour map that is missing or cannot be decoded, and is multiplied with its factor: between the
+/// 0.5 of usual colour maps and the 0.8 of surfaces without a material. The factor alone is often white, and a closed
+/// level of albedo 1 is a furnace. An emission map that is missing counts as black.
+inline constexpr float kMissingColor = 0.6f;
+
+/// Sources of light brighter than this (candela, lux, nits) are cut to it, so that sums of light stay floats.
+inline constexpr float kMostIntensity = 1e32f;
 
 enum class LightType { Point, Spot, Directional };
 

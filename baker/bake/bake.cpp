@@ -107,9 +107,10 @@ BakeStats sumUp(std::span<const WaveStats> waves, const BakeOptions& options) {
     residuals += wave.residuals;
     for (const NonFiniteSample& s : wave.firstNonFinite)
       if (notes.size() < kMostNotes)
-        notes.push_back("non-finite sample left out: page " + std::to_string(s.page) + ", texel (" +
-                        std::to_string(s.texel.x) + ", " + std::to_string(s.texel.y) + "), sample " +
-                        std::to_string(s.sample) + ", seed " + std::to_string(options.seed));
+        notes.push_back("sample that is not finite (infinite light is cut, what is no number is left out): page " +
+                        std::to_string(s.page) + ", texel (" + std::to_string(s.texel.x) + ", " +
+                        std::to_string(s.texel.y) + "), sample " + std::to_string(s.sample) + ", seed " +
+                        std::to_string(options.seed));
   }
   if (total.cutPaths > 0)
     notes.push_back("light of more than " + std::to_string(kMostLosslessHits) +

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <span>
 
 #include "lightmap/maps/denoise.h"
@@ -83,6 +84,29 @@ void finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::v
       }
     });
   }
+}
+
+void cutToHalf(BakeResult& result) {
+  std::size_t cut = 0;
+  float most = 0.0f;
+  const auto cutImage = [&](Image& image) {
+    for (float& v : image.pixels) {
+      if (std::abs(v) <= kMostHalf) continue;
+      ++cut;
+      most = std::max(most, std::abs(v));
+      v = std::copysign(kMostHalf, v);
+    }
+  };
+  for (BakedPage& page : result.pages) {
+    for (Image& map : page.maps) cutImage(map);
+    cutImage(page.flat);
+  }
+  if (cut == 0) return;
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "%zu values are beyond 65504, the most that --half holds, and are cut to it; the greatest was %.4g",
+                cut, static_cast<double>(most));
+  result.stats.notes.insert(result.stats.notes.begin(), text);
 }
 
 }  // namespace lumel

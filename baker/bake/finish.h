@@ -24,4 +24,10 @@ struct FinishOptions {
 void finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels,
                  const FinishOptions& options);
 
+/// The largest number that a half holds.
+inline constexpr float kMostHalf = 65504.0f;
+
+/// Cuts light beyond kMostHalf, with a note in the figures that says how many values that were and how large.
+void cutToHalf(BakeResult& result);
+
 }  // namespace lumel

@@ -5,13 +5,18 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <string>
 #include <tuple>
 #include <vector>
 
 #include "baker/bake/bake.h"
 #include "baker/light/lit_scene.h"
+#include "baker/rays/materials.h"
+#include "baker/rays/ray_scene.h"
+#include "baker/rays/sampling.h"
 #include "lightmap/surface.h"
 #include "lightmap/texels/texels.h"
+#include "scene/base/sobol.h"
 #include "scene/base/union_find.h"
 #include "scene/triangles/triangles.h"
 
@@ -207,6 +212,73 @@ class SideAtlas {
   std::vector<Placed> triangles_;  // of all surfaces, in order
 };
 
+/// Tells for each patch whether its front faces something right behind it while its back is open: a sign on a wall that
+/// is wound towards the wall. Nobody sees such a front, however much light finds its way between.
+class HiddenFronts {
+ public:
+  HiddenFronts(const Scene& scene, const RayScene& rays) : scene_(scene), rays_(rays) {}
+
+  void find(const TwoSided& twoSided, std::vector<bool>& hidden) const {
+    std::vector<std::vector<std::uint32_t>> triangles(twoSided.patchCount);
+    for (std::uint32_t t = 0; t < twoSided.patchOf.size(); ++t)
+      triangles[twoSided.patchOf[t] - twoSided.firstPatch].push_back(t);
+    const auto place = std::find_if(scene_.instances.begin(), scene_.instances.end(), [&](const Instance& instance) {
+      return instance.settings.receives && instance.mesh == twoSided.mesh;
+    });
+    if (place == scene_.instances.end()) return;
+    for (std::uint32_t i = 0; i < twoSided.patchCount; ++i) {
+      const double front = nearShare(*place, twoSided, triangles[i], 1.0f);
+      if (front >= kHiddenShare && nearShare(*place, twoSided, triangles[i], -1.0f) <= kOpenShare)
+        hidden[twoSided.firstPatch + i] = true;
+    }
+  }
+
+ private:
+  /// The share of cosine-distributed rays from a side of a patch that end before a person's head would have room.
+  double nearShare(const Instance& instance, const TwoSided& twoSided, const std::vector<std::uint32_t>& triangles,
+                   float side) const {
+    const Primitive& primitive = scene_.primitive(twoSided.mesh, twoSided.primitive);
+    const float turned = glm::determinant(Mat3(instance.worldFromObject)) < 0.0f ? -side : side;
+    std::size_t rays = 0, nears = 0;
+    for (std::uint32_t packet = 0; packet < kPackets; ++packet) {
+      RayPacket sent;
+      for (int lane = 0; lane < kLanes; ++lane) {
+        const std::uint32_t n = packet * kLanes + static_cast<std::uint32_t>(lane);
+        const std::uint32_t* corner = primitive.indices.data() + std::size_t{3} * triangles[n % triangles.size()];
+        std::array<Vec3, 3> at;
+        for (std::size_t k = 0; k < 3; ++k)
+          at[k] = Vec3(instance.worldFromObject * Vec4(primitive.positions[corner[k]], 1.0f));
+        const Vec3 cross = turned * glm::cross(at[1] - at[0], at[2] - at[0]);
+        if (!(glm::length(cross) > 0.0f)) continue;
+        const Vec3 normal = glm::normalize(cross);
+        const std::uint32_t seed = hashCombine(twoSided.firstPatch, n);
+        const Vec2 b = sampleTriangle({unitFloat(seed), unitFloat(hashCombine(seed, 1))});
+        const Vec3 dir = frameAround(normal).fromLocal(
+            sampleCosineHemisphere({unitFloat(hashCombine(seed, 2)), unitFloat(hashCombine(seed, 3))}));
+        const Vec3 p = at[0] + b.x * (at[1] - at[0]) + b.y * (at[2] - at[0]);
+        sent.set(lane,
+                 offsetPoint(p, normal, at, rays_.translationOf(static_cast<int>(&instance - scene_.instances.data()))),
+                 dir);
+      }
+      rays_.intersect(sent, TraceMode::Packet);
+      for (int lane = 0; lane < kLanes; ++lane) {
+        rays += sent.valid[lane] != 0 ? 1 : 0;
+        nears += sent.hit(lane) && sent.rayhit.ray.tfar[lane] < kNobodyLooks ? 1 : 0;
+      }
+    }
+    return rays == 0 ? 0.0 : static_cast<double>(nears) / static_cast<double>(rays);
+  }
+
+  static constexpr std::uint32_t kPackets = 16;
+  /// Metres in which there is no room for a head and eyes; a sign this far from its wall sends five of six rays into
+  /// it.
+  static constexpr float kNobodyLooks = 0.5f;
+  static constexpr double kHiddenShare = 0.6;
+  static constexpr double kOpenShare = 0.3;
+  const Scene& scene_;
+  const RayScene& rays_;
+};
+
 /// Turns the triangles of dark patches; their vertices become their own. Returns how many they are.
 std::size_t turn(Primitive& primitive, const std::vector<std::uint32_t>& patchOf, const std::vector<bool>& dark) {
   std::size_t turned = 0;
@@ -321,6 +393,13 @@ Expected<std::size_t> turnToLight(Scene& scene, const Progress& progress) {
   std::vector<bool> dark(patches);
   for (std::size_t i = 0; i < patches; ++i)
     dark[i] = (*light)[2 * i] < (odd[i] ? kDarkAgainstOthers : kDark) * (*light)[2 * i + 1];
+  std::vector<std::string> notes;
+  const Materials materials(scene, false, notes);
+  const auto rays = RayScene::build(scene, materials);
+  if (!rays) return rays.error();
+  const HiddenFronts fronts(scene, **rays);
+  for (const TwoSided& p : primitives) fronts.find(p, dark);
+
   std::size_t turned = 0;
   for (const TwoSided& p : primitives)
     turned += turn(scene.meshes[static_cast<std::size_t>(p.mesh)].primitives[static_cast<std::size_t>(p.primitive)],

@@ -39,6 +39,7 @@ struct BakeArguments : SceneArguments {
   Denoise denoise = Denoise::Auto;
   int dilate = kDilateByPadding;
   bool half = false;
+  bool strict = false;
   int threads = 0;
   Quality quality = Quality::Production;
   int samples = 0;  // 0: as the quality has it
@@ -97,7 +98,24 @@ void declareOptions(OptionTable& options, BakeArguments& a) {
       .placeholder = "DIR";
   declareLightOptions(options, a);
   options.group("General");
+  options.flag("strict", a.strict, "Exit with 4 if there was any warning; the result is written all the same");
   options.integer("threads", a.threads, {0, 1024}, "Threads to use, without influence on the result; 0: one per core");
+}
+
+/// Warns of light that halfs cannot hold, where that is known before the bake: suns and skies as a facing surface
+/// stores them.
+void warnOfHalf(Scene& scene) {
+  const auto warn = [&](const std::string& what, float stored) {
+    if (stored <= kMostHalf) return;
+    char text[64];
+    std::snprintf(text, sizeof text, " alone brings %.3g, and --half ends at 65504", static_cast<double>(stored));
+    scene.report.warnings.push_back(what + text + "; what is beyond is cut");
+  };
+  const auto peak = [](const Vec3& c) { return std::max({c.x, c.y, c.z}); };
+  for (const Light& light : scene.lights)
+    if (light.type == LightType::Directional)
+      warn("light '" + light.name + "'", light.intensity * peak(light.color) * kInvPi);
+  if (scene.environment.image.empty()) warn("the sky", scene.environment.strength * peak(scene.environment.color));
 }
 
 /// What the options cannot check one by one.
@@ -211,8 +229,9 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   StageClock clock(context.quiet);
   Progress& progress = context.progress;
   clock.start("load");
-  const auto scene = loadLitScene(a, context.progress);
+  auto scene = loadLitScene(a, context.progress);
   if (!scene) return scene.error();
+  if (a.half) warnOfHalf(*scene);
   if (!context.quiet) printSettings(record.settings);
   if (!context.quiet) printWarnings(scene->report.warnings);
   if (progress.cancelled()) return interrupted();
@@ -220,12 +239,13 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   clock.start("atlas");
   const auto atlas = makeAtlas(*scene, a, context);
   if (!atlas) return atlas.error();
-  if (!context.quiet && atlas->atlas.charts.empty())
-    std::fprintf(
-        stderr,
-        "lumel: warning: no triangle of the scene gets a lightmap (%zu without area, %zu primitives of points or "
-        "lines are left out)\n",
-        scene->report.degenerateTriangles, scene->report.skippedPrimitives);
+  if (atlas->atlas.charts.empty()) {
+    scene->report.warnings.push_back("no triangle of the scene gets a lightmap (" +
+                                     std::to_string(scene->report.degenerateTriangles) + " without area, " +
+                                     std::to_string(scene->report.skippedPrimitives) +
+                                     " primitives of points or lines are left out)");
+    if (!context.quiet) printWarnings({scene->report.warnings.back()});
+  }
   returnFreeMemory();
   clock.start("texels");
   const auto texels = findTexels(atlas->atlas);
@@ -235,6 +255,7 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   if (!baked) return baked.error();
   clock.start("finish");
   finishPages(baked->pages, atlas->atlas, texels, {.denoise = denoises(a), .rings = dilate});
+  if (a.half) cutToHalf(*baked);
   clock.stop();
   if (progress.cancelled()) return interrupted();
 
@@ -243,10 +264,18 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   clock.start("write");
   if (auto written = writeBake(a.output, *scene, *atlas, *baked, record); !written) return written;
   clock.stop();
-  if (context.quiet) return {};
   record.stages = clock.stages();
   record.peakMemoryBytes = peakMemoryBytes();
-  printSummary(a.output, *atlas, *baked, record);
+  if (!context.quiet) {
+    printSummary(a.output, *atlas, *baked, record);
+    printWarnings(baked->stats.notes);
+  }
+  const std::size_t warnings =
+      scene->report.warnings.size() + atlas->report.warnings.size() + baked->stats.notes.size();
+  if (a.strict && warnings > 0)
+    return Error{ErrorKind::Threshold, "--strict: " + std::to_string(warnings) + " warning" +
+                                           (warnings == 1 ? "" : "s") + "; they are in " +
+                                           (a.output / "bake.json").string()};
   return {};
 }
 

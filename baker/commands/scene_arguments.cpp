@@ -6,6 +6,7 @@
 #include "baker/bake/lit_sides.h"
 #include "scene/images/environment.h"
 #include "scene/load/load_scene.h"
+#include "scene/triangles/sky_dome.h"
 
 namespace lumel {
 
@@ -40,6 +41,9 @@ void declareSky(OptionTable& options, SceneArguments& a) {
               "Degrees by which the sky image is turned, counter-clockwise from above")
       .placeholder = "DEGREES";
   options.number("sky-strength", a.skyStrength, {0.0f}, "Factor on the sky image or colour");
+  options.choice("sky-dome", a.skyDome, {"keep", "leave-out"},
+                 "Meshes around the level that paint its sky: they keep sun and sky out (keep, with a warning), or are "
+                 "as if they were not there (leave-out)");
 }
 
 void declareSkyAndSides(OptionTable& options, SceneArguments& a) {
@@ -61,6 +65,23 @@ Expected<void> checkAtlas(const AtlasOptions& atlas) {
   return {};
 }
 
+/// Leaves out sky domes, or warns of those that keep light from outside away.
+static void treatSkyDomes(Scene& scene, SkyDome treatment) {
+  const bool lightFromOutside = !scene.environment.isBlack() ||
+                                std::any_of(scene.lights.begin(), scene.lights.end(),
+                                            [](const Light& light) { return light.type == LightType::Directional; });
+  if (treatment == SkyDome::Keep && !lightFromOutside) return;
+  for (const int index : findSkyDomes(scene)) {
+    Instance& dome = scene.instances[static_cast<std::size_t>(index)];
+    if (treatment == SkyDome::LeaveOut)
+      dome.settings.casts = dome.settings.receives = false;
+    else
+      scene.report.warnings.push_back("'" + dome.name +
+                                      "' is around all the rest like a sky dome and keeps sun and sky out; --sky-dome "
+                                      "leave-out takes it away");
+  }
+}
+
 Expected<Scene> loadSceneUnderSky(const SceneArguments& a) {
   auto scene = loadScene(a.scene, {.allowOutsidePaths = a.allowOutsidePaths});
   if (!scene) return scene;
@@ -73,6 +94,7 @@ Expected<Scene> loadSceneUnderSky(const SceneArguments& a) {
   }
   scene->environment.rotationDegrees = a.skyRotation;
   scene->environment.strength = a.skyStrength;
+  treatSkyDomes(*scene, a.skyDome);
   if (!hasLight(*scene))
     scene->report.warnings.insert(scene->report.warnings.begin(),
                                   "the scene has no light and all will be black; give --sky-color or --sky");

@@ -19,10 +19,17 @@ enum class DoubleSided {
   Wound,  // the one that is wound to be its front
 };
 
+/// What becomes of meshes that paint the sky around a level (findSkyDomes).
+enum class SkyDome {
+  Keep,      // they stay, with a warning where they keep light out
+  LeaveOut,  // they neither cast nor receive
+};
+
 struct SceneArguments {
   std::filesystem::path scene;
   bool allowOutsidePaths = false;
   DoubleSided doubleSided = DoubleSided::Lit;
+  SkyDome skyDome = SkyDome::Keep;
   Vec3 skyColor{0, 0, 0};
   std::filesystem::path sky;
   float skyRotation = 0.0f;

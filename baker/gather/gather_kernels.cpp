@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "baker/gather/texel_map.h"
+#include "baker/rays/non_finite.h"
 #include "baker/rays/sampling.h"
 
 namespace lumel {
@@ -107,11 +108,11 @@ LUMEL_FOR_EACH_CPU bool addLight(const Vec3Lanes& dirTangent, const KernelLanes&
   int lost = 0;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const float any = light.x[lane] + light.y[lane] + light.z[lane];
-    const bool isNumber = any - any == 0.0f;
-    lost |= isNumber ? 0 : 1;
-    red[lane] = isNumber ? light.x[lane] : 0.0f;
-    green[lane] = isNumber ? light.y[lane] : 0.0f;
-    blue[lane] = isNumber ? light.z[lane] : 0.0f;
+    const bool isNumber = any == any;
+    lost |= any - any == 0.0f ? 0 : 1;
+    red[lane] = isNumber ? std::min(light.x[lane], kMostSampleLight) : 0.0f;
+    green[lane] = isNumber ? std::min(light.y[lane], kMostSampleLight) : 0.0f;
+    blue[lane] = isNumber ? std::min(light.z[lane], kMostSampleLight) : 0.0f;
   }
   const auto addTo = [&](std::size_t map, const float* k) {
     for (std::size_t lane = 0; lane < kLanes; ++lane) {

@@ -55,7 +55,8 @@ struct alignas(64) MapTotals {
 static_assert(kLanes == kKernelLanes);
 
 /// Adds light that arrives along dirTangent: times max(0, z) to the flat map, times the kernels to the `maps` others.
-/// Light that is not finite is left out; returns whether there was any.
+/// Light that is no number is left out, and what is beyond kMostSampleLight is cut to it; returns whether any light was
+/// not finite.
 bool addLight(const Vec3Lanes& dirTangent, const KernelLanes& kernels, std::size_t maps, const Vec3Lanes& light,
               MapSums& sums);
 

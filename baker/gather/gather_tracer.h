@@ -223,6 +223,8 @@ class GatherTracer {
       ++rays_;
     }
     transport_.rays.intersect(packet_, TraceMode::Packet);
+    if (packet_.tinted != 0)
+      forEachLane(packet_.tinted, [&](std::size_t lane) { flights_[lane].beta *= packet_.passed[lane]; });
     map_.findTriangles(packet_, lookup_);
     stage_ = Stage::Traced;
   }

@@ -102,7 +102,7 @@ void GatherWave::sampleStrategy(std::size_t strategy, std::uint32_t first, std::
                   0, kGatherDensity, sampled, isSky ? &sky[s % 2] : nullptr);
     if (rays == 0) continue;
     sink.result.shadowRays += rays;
-    wave_.scene.transport.rays.occluded(sampled.shadows, TraceMode::Packet);
+    sampled.trace(wave_.scene.transport.rays, TraceMode::Packet);
     Vec3Lanes dirTangent;
     turnToTangent(points.frame, sampled.wi, dirTangent);
     if (pilot) tallyLight(sampled, dirTangent, lightTallies_[strategy]);
@@ -172,7 +172,7 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
   const TexelMap::Lookup& lookup = packet.lookup;
   const int level = wave_.scene.levels.read(wave_.scene.bounces, 0);
   const std::uint32_t tooCoarse = level >= 0 ? lookup.near | lookup.uneven : 0u;
-  const FoundTexels found = sortFound(rays.packet, lookup.texels, lookup.others | tooCoarse);
+  const FoundTexels found = sortFound(rays.packet, lookup.texels, lookup.others | tooCoarse | rays.packet.tinted);
   sink.result.rays += static_cast<std::uint64_t>(std::popcount(found.lookedUp | found.others | found.missed));
   Vec3Lanes light;
   if (level >= 0)
@@ -200,7 +200,7 @@ void GatherWave::collectSky(const AimedRays& rays, std::uint32_t lanes, Vec3Lane
   Vec3Lanes sky;
   wave_.scene.transport.environment.arriving(rays.packet.directions(), rays.pdf, sky);
   forEachLane(lanes, [&](std::size_t lane) {
-    const Vec3 arriving = rays.weight[lane] * sky[lane];
+    const Vec3 arriving = rays.weight[lane] * rays.packet.tint(lane) * sky[lane];
     const bool isSeen = isFinite(arriving) && wave_.scene.indirectOnly;
     if (isSeen)
       sink.addSeen(lane, rays.dirTangent[lane], arriving);

@@ -153,7 +153,7 @@ std::array<WarmTexel, kLanes> WarmWave::warmUp(std::span<CacheLink> links, Gathe
       ++counts.rays;
       flight = wave_.flightOf(l, s, from, rays);
       flight.key = wave_.samplers[l].seedOf(kWarmHits);
-      flight.beta = Vec3(1.0f);
+      flight.beta = rays.packet.tint(l);
       return flight;
     });
   }

@@ -22,7 +22,7 @@ Flight WaveTexels::flightOf(std::size_t lane, std::uint32_t sample, const PointL
           .sample = sample,
           .key = samplers[lane].seedOf(kHits),
           .dirTangent = rays.dirTangent[lane],
-          .beta = Vec3(rays.weight[lane]),
+          .beta = rays.weight[lane] * rays.packet.tint(lane),
           .origin = from.p[lane],
           .pdf = rays.pdf[lane]};
 }

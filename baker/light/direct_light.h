@@ -48,6 +48,13 @@ struct SampledLight {
   ShadowPacket shadows;
 
   bool found(std::size_t lane) const { return shadows.visible(static_cast<int>(lane)); }
+  /// Traces the shadow rays; light that comes through surfaces that tint it takes their colours.
+  void trace(const RayScene& rays, TraceMode mode) {
+    rays.occluded(shadows, mode);
+    if (shadows.tinted == 0) return;
+    for (std::size_t lane = 0; lane < kLanes; ++lane)
+      if ((shadows.tinted >> lane & 1u) != 0) light.set(lane, light[lane] * shadows.passed[lane]);
+  }
 };
 
 /// What is learnt of punctual lights while samples are taken, and the groups of the lights that the lanes chose last.
@@ -83,7 +90,7 @@ std::uint64_t directLight(const LightTransport& transport, const ReceiverLanes& 
         takeLight(transport, {kind}, receivers, samples, patternBase, density, sampled, nullptr, choice);
     if (rays == 0) return;
     shadowRays += rays;
-    transport.rays.occluded(sampled.shadows, mode);
+    sampled.trace(transport.rays, mode);
     if (choice != nullptr) learn(sampled, receivers, *choice);
     for (std::size_t lane = 0; lane < kLanes; ++lane)
       if (sampled.found(lane)) add(static_cast<int>(lane), sampled.wi[lane], sampled.light[lane]);
@@ -106,7 +113,7 @@ std::uint64_t directLight(const LightTransport& transport, const LightLanes& lan
     ns.set(lane, lanes.receivers[lane].ns);
     rayStart.set(lane, lanes.receivers[lane].rayStart);
   }
-  return directLight(transport, ReceiverLanes{lanes.active, p, ng, ns, rayStart, lanes.perReach2}, samples, patternBase,
+  return directLight(transport, ReceiverLanes{lanes.active, p, ng, ns, rayStart, false, lanes.perReach2}, samples, patternBase,
                      mode, density, add, punctual);
 }
 

@@ -5,6 +5,7 @@
 
 #include "baker/light/direct_light.h"
 #include "baker/light/near_lights.h"
+#include "baker/rays/non_finite.h"
 #include "baker/rays/sampling.h"
 #include "baker/rays/stratified_net.h"
 
@@ -46,6 +47,7 @@ struct Path {
   float pdf = 0.0f;  // density of the ray in flight's direction
   int losslessHits = 0;
   SampleValue value;
+  bool isCut = false;  // it brought more than kMostSampleLight
   std::array<Vec3, kProbeNormals> probes{};
 };
 
@@ -199,7 +201,9 @@ void WaveTracer::launch(int lane, const Receiver& receiver, const Vec3& dirWorld
 void WaveTracer::addLight(int lane, const Vec3& dirTangent, const Vec3& radianceOverPdf) {
   const auto l = static_cast<std::size_t>(lane);
   Path& path = paths_[l];
-  const Vec3 light = radianceOverPdf * kInvPi;
+  const Vec3 arriving = radianceOverPdf * kInvPi;
+  const Vec3 light = glm::min(arriving, Vec3(kMostSampleLight));  // what is no number stays so
+  path.isCut = path.isCut || light != arriving;
   const MapKernels kernels = encoding_.kernels(dirTangent);
   path.value.flat += light * std::max(0.0f, dirTangent.z);
   for (std::size_t i = 0; i < encoding_.mapCount(); ++i) path.value.maps[i] += light * kernels[i];
@@ -242,6 +246,8 @@ void WaveTracer::lightTexels() {
 void WaveTracer::followPaths() {
   for (int depth = 0;; ++depth) {
     transport_.rays.intersect(rays_, TraceMode::Packet);
+    if (rays_.tinted != 0)
+      for (std::size_t lane = 0; lane < kLanes; ++lane) paths_[lane].beta *= rays_.tint(lane);
     findHits(depth);
     for (int lane = 0; lane < kLanes; ++lane)
       lanes_.active[static_cast<std::size_t>(lane)] = rays_.valid[lane] != 0 && shadeHit(lane, depth);
@@ -344,10 +350,9 @@ void WaveTracer::finishSample() {
     if (path.radiance != Vec3(0.0f))
       addLight(static_cast<int>(lane), path.gatherTangent, path.radiance / path.gatherPdf);
     const std::uint32_t sample = samples_.sample(static_cast<int>(lane));
-    if (!allFinite(path.value, maps)) {
-      result_.nonFinite.push_back({page_, coords_[lane], sample});
-      continue;
-    }
+    const bool isNumber = allFinite(path.value, maps);
+    if (!isNumber || path.isCut) result_.nonFinite.push_back({page_, coords_[lane], sample});
+    if (!isNumber) continue;
     TexelResult& texel = result_.texels[lane];
     texel.sums.add(
         path.value, maps,

@@ -60,24 +60,31 @@ Materials::Materials(const Scene& scene, bool bounces, std::vector<std::string>&
     for (const Primitive& primitive : scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives) {
       const Material& m = material(primitive.material);
       const bool opaque = m.alphaMode == AlphaMode::Opaque;
-      if (bounces || !opaque) need(m.baseColorMap, opaque);
+      if (bounces || !opaque || m.transmission > 0.0f) need(m.baseColorMap, opaque);
       if (emits(primitive.material)) need(m.emissionMap, false);
     }
   }
   srgbByImage_.resize(scene.images.size());
   std::vector<std::string> failures(scene.images.size());
+  std::vector<char> undecodable(scene.images.size(), 0);
   parallelFor(scene.images.size(), 1, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
-      if (!needed[i] || scene.images[i].encoded.empty()) continue;
+      if (!needed[i]) continue;
+      if (scene.images[i].encoded.empty()) {
+        undecodable[i] = 1;
+        continue;
+      }
       auto texture = Texture::decode(scene.images[i], ColorSpace::Srgb);
       if (texture)
         srgbByImage_[i].emplace(*std::move(texture), averaged[i] != 0);
       else
         failures[i] = texture.error().message;
+      undecodable[i] = srgbByImage_[i] ? 0 : 1;
     }
   });
   for (const std::string& failure : failures)
-    if (!failure.empty()) notes.push_back(failure + "; its factor is used alone");
+    if (!failure.empty()) notes.push_back(failure + "; colour counts as grey, emission as black");
+  undecodable_ = std::move(undecodable);
 }
 
 const TexturePyramid* Materials::colorTexture(int index) const {
@@ -99,13 +106,15 @@ const Texture* Materials::albedoTexture(int index, float uvWidth) const {
 
 Materials::AlbedoLookup Materials::findAlbedo(const TrianglePoint& point, const Texture* texture) const {
   const Material& m = material(point.primitive->material);
-  AlbedoLookup lookup{Vec3(m.baseColor), texture};
+  AlbedoLookup lookup{Vec3(m.baseColor), m.transmission, texture};
+  if (isUndecodable(m.baseColorMap)) lookup.factor *= kMissingColor;
   if (texture != nullptr) lookup.at = texture->footprint(m.baseColorMap, uvAt(point, m.baseColorMap.uvSet));
   if (!point.primitive->colors.empty()) lookup.factor *= Vec3(interpolate(point, point.primitive->colors));
   return lookup;
 }
 
-Vec3 Materials::albedo(const AlbedoLookup& lookup) {
+/// Returns the base colour at a point, each channel 0..1.
+static Vec3 colorOf(const Materials::AlbedoLookup& lookup) {
   const Vec3 color =
       lookup.texture != nullptr ? lookup.factor * Vec3(lookup.texture->sample(lookup.at)) : lookup.factor;
   return glm::clamp(color, Vec3(0.0f), Vec3(1.0f));
@@ -116,6 +125,13 @@ const Texture* Materials::emissionTexture(int index) const {
   if (!ref || static_cast<std::size_t>(ref.image) >= srgbByImage_.size()) return nullptr;
   const auto& texture = srgbByImage_[static_cast<std::size_t>(ref.image)];
   return texture ? &texture->finest() : nullptr;
+}
+
+Vec3 Materials::albedo(const AlbedoLookup& lookup) {
+  const Vec3 color = colorOf(lookup);
+  if (lookup.transmission == 0.0f) return color;
+  const float held = 1.0f - lookup.transmission * std::max({color.x, color.y, color.z});
+  return held > 0.0f ? color * ((1.0f - lookup.transmission) / held) : Vec3(0.0f);
 }
 
 Vec3 Materials::emission(const TrianglePoint& point) const {
@@ -136,13 +152,26 @@ float Materials::alpha(const TrianglePoint& point) const {
   return a;
 }
 
-float Materials::opacity(const TrianglePoint& point) const {
+float Materials::opacityByAlpha(const TrianglePoint& point) const {
   const Material& m = material(point.primitive->material);
   return m.alphaMode == AlphaMode::Opaque ? 1.0f : applyAlphaMode(m, alpha(point));
 }
 
+float Materials::opacity(const TrianglePoint& point) const {
+  if (!transmits(*point.primitive)) return opacityByAlpha(point);
+  const Vec3 passing = transmittance(point);
+  return 1.0f - std::max({passing.x, passing.y, passing.z});
+}
+
+Vec3 Materials::transmittance(const TrianglePoint& point) const {
+  const float held = opacityByAlpha(point);
+  const float transmission = material(point.primitive->material).transmission;
+  return Vec3(1.0f - held) + held * transmission * colorOf(findAlbedo(point));
+}
+
 bool Materials::needsAlphaTest(const Primitive& primitive) const {
   const Material& m = material(primitive.material);
+  if (m.transmission > 0.0f) return true;
   if (m.alphaMode == AlphaMode::Opaque) return false;
   const TexturePyramid* textures = colorTexture(primitive.material);
   if ((textures && !textures->finest().opaque()) || hasPartialVertexAlpha(primitive)) return true;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
+#include <numeric>
 
 #include "lightmap/texels/vertex_normal.h"
 #include "scene/base/check.h"
@@ -18,11 +19,14 @@ T* embreeBuffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format, std:
   return static_cast<T*>(rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(T), count));
 }
 
-RTCIntersectContext newContext() {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  return context;
-}
+/// What filters may write to, behind what Embree knows of it.
+struct TraceContext {
+  RTCIntersectContext embree;
+  std::uint32_t tinted = 0;     // bits of lanes that passed through a surface that gives light a colour
+  Vec3Lanes* passed = nullptr;  // products of these colours, where wanted
+
+  TraceContext() { rtcInitIntersectContext(&embree); }
+};
 
 /// A number in [0, 1) from a ray's bits and the triangle: the same for every thread and every order of work.
 float rayHash(RTCRayN* ray, unsigned int rays, unsigned int lane, std::uint32_t geometry, std::uint32_t triangle) {
@@ -38,7 +42,7 @@ void initRays(RTCRay16& ray) {
   std::fill(std::begin(ray.tnear), std::end(ray.tnear), 0.0f);
   std::fill(std::begin(ray.time), std::end(ray.time), 0.0f);
   std::fill(std::begin(ray.mask), std::end(ray.mask), 0xffffffffu);
-  std::fill(std::begin(ray.id), std::end(ray.id), 0u);
+  std::iota(std::begin(ray.id), std::end(ray.id), 0u);  // filters tell lanes by it
   std::fill(std::begin(ray.flags), std::end(ray.flags), 0u);
 }
 
@@ -187,7 +191,9 @@ EmbreeGeometry RayScene::triangles(const Primitive& primitive, const Mat4* world
         worldFromObject ? Vec3(*worldFromObject * Vec4(primitive.positions[i], 1.0f)) : primitive.positions[i];
   if (vertices) *vertices = positions;
   if (materials_->needsAlphaTest(primitive)) {
-    alphaTested_.push_back(std::make_unique<AlphaTested>(AlphaTested{materials_, &primitive}));
+    alphaTested_.push_back(
+        std::make_unique<AlphaTested>(AlphaTested{materials_, &primitive, materials_->transmits(primitive)}));
+    tints_ = tints_ || materials_->transmits(primitive);
     rtcSetGeometryUserData(geometry.get(), alphaTested_.back().get());
     rtcSetGeometryIntersectFilterFunction(geometry.get(), &RayScene::alphaFilter);
     rtcSetGeometryOccludedFilterFunction(geometry.get(), &RayScene::alphaFilter);
@@ -217,51 +223,86 @@ void RayScene::alphaFilter(const RTCFilterFunctionNArguments* args) {
   for (unsigned int lane = 0; lane < args->N; ++lane) {
     if (args->valid[lane] != -1) continue;
     const std::uint32_t triangle = RTCHitN_primID(args->hit, args->N, lane);
-    const float opacity = tested.materials->opacity(
-        {tested.primitive, triangle, {RTCHitN_u(args->hit, args->N, lane), RTCHitN_v(args->hit, args->N, lane)}});
+    const TrianglePoint point{
+        tested.primitive, triangle, {RTCHitN_u(args->hit, args->N, lane), RTCHitN_v(args->hit, args->N, lane)}};
+    const Vec3 passing = tested.transmits ? tested.materials->transmittance(point) : Vec3(0.0f);
+    const float share = std::max({passing.x, passing.y, passing.z});
+    const float opacity = tested.transmits ? 1.0f - share : tested.materials->opacity(point);
     if (opacity >= 1.0f) continue;
     const std::uint32_t geometry = RTCHitN_geomID(args->hit, args->N, lane);
-    if (opacity <= 0.0f || rayHash(args->ray, args->N, lane, geometry, triangle) >= opacity) args->valid[lane] = 0;
+    if (opacity > 0.0f && rayHash(args->ray, args->N, lane, geometry, triangle) < opacity) continue;
+    args->valid[lane] = 0;
+    if (!tested.transmits) continue;
+    // `share` of the rays pass, so each brings passing / share of the light.
+    auto& context = *reinterpret_cast<TraceContext*>(args->context);
+    const std::size_t ray = RTCRayN_id(args->ray, args->N, lane);
+    context.tinted |= 1u << ray;
+    if (context.passed != nullptr) context.passed->set(ray, (*context.passed)[ray] * (passing / share));
   }
 }
 
 void RayScene::intersect(RayPacket& rays, TraceMode mode) const {
-  RTCIntersectContext context = newContext();
-  if (mode == TraceMode::Coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  TraceContext context;
+  if (mode == TraceMode::Coherent) context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   if (mode != TraceMode::Single) {
-    rtcIntersect16(rays.valid, top_.get(), &context, &rays.rayhit);
-    return;
+    rtcIntersect16(rays.valid, top_.get(), &context.embree, &rays.rayhit);
+  } else {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      if (!rays.valid[lane]) continue;
+      RTCRayHit one;
+      one.ray = rtcGetRayFromRayN(reinterpret_cast<RTCRayN*>(&rays.rayhit.ray), kLanes, static_cast<unsigned>(lane));
+      one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+      one.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+      rtcIntersect1(top_.get(), &context.embree, &one);
+      rays.rayhit.ray.tfar[lane] = one.ray.tfar;
+      rays.rayhit.hit.u[lane] = one.hit.u;
+      rays.rayhit.hit.v[lane] = one.hit.v;
+      rays.rayhit.hit.primID[lane] = one.hit.primID;
+      rays.rayhit.hit.geomID[lane] = one.hit.geomID;
+      rays.rayhit.hit.instID[0][lane] = one.hit.instID[0];
+    }
   }
-  for (int lane = 0; lane < kLanes; ++lane) {
-    if (!rays.valid[lane]) continue;
-    RTCRayHit one;
-    one.ray = rtcGetRayFromRayN(reinterpret_cast<RTCRayN*>(&rays.rayhit.ray), kLanes, static_cast<unsigned>(lane));
-    one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    one.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(top_.get(), &context, &one);
-    rays.rayhit.ray.tfar[lane] = one.ray.tfar;
-    rays.rayhit.hit.u[lane] = one.hit.u;
-    rays.rayhit.hit.v[lane] = one.hit.v;
-    rays.rayhit.hit.primID[lane] = one.hit.primID;
-    rays.rayhit.hit.geomID[lane] = one.hit.geomID;
-    rays.rayhit.hit.instID[0][lane] = one.hit.instID[0];
+  rays.tinted = context.tinted;
+  if (rays.tinted != 0) findTints(rays);
+}
+
+/// Embree finds candidates for the closest hit in any order, so what was passed on the way is known only afterwards:
+/// the same ray, whose choices at surfaces are the same, is sent once more as far as to its hit.
+void RayScene::findTints(RayPacket& rays) const {
+  constexpr float kBeforeHit = 1.0f - 0x1p-21f;
+  RTCRay16 again = rays.rayhit.ray;
+  alignas(64) int valid[kLanes] = {};
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if ((rays.tinted >> lane & 1u) == 0) continue;
+    valid[lane] = -1;
+    again.tfar[lane] *= kBeforeHit;
+    rays.passed.set(lane, Vec3(1.0f));
   }
+  TraceContext context;
+  context.passed = &rays.passed;
+  rtcOccluded16(valid, top_.get(), &context.embree, &again);
 }
 
 void RayScene::occluded(ShadowPacket& rays, TraceMode mode) const {
+  rays.tinted = 0;
   if (!rays.any) return;
   LUMEL_CHECK(mode != TraceMode::Coherent);
-  RTCIntersectContext context = newContext();
+  TraceContext context;
+  if (tints_) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) rays.passed.set(lane, Vec3(1.0f));
+    context.passed = &rays.passed;
+  }
   if (mode != TraceMode::Single) {
-    rtcOccluded16(rays.valid, top_.get(), &context, &rays.ray);
-    return;
+    rtcOccluded16(rays.valid, top_.get(), &context.embree, &rays.ray);
+  } else {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      if (!rays.valid[lane]) continue;
+      RTCRay one = rtcGetRayFromRayN(reinterpret_cast<RTCRayN*>(&rays.ray), kLanes, static_cast<unsigned>(lane));
+      rtcOccluded1(top_.get(), &context.embree, &one);
+      rays.ray.tfar[lane] = one.tfar;
+    }
   }
-  for (int lane = 0; lane < kLanes; ++lane) {
-    if (!rays.valid[lane]) continue;
-    RTCRay one = rtcGetRayFromRayN(reinterpret_cast<RTCRayN*>(&rays.ray), kLanes, static_cast<unsigned>(lane));
-    rtcOccluded1(top_.get(), &context, &one);
-    rays.ray.tfar[lane] = one.tfar;
-  }
+  rays.tinted = context.tinted;
 }
 
 float RayScene::translationOf(int instance) const {

@@ -34,6 +34,8 @@ enum class TraceMode {
 struct alignas(64) RayPacket {
   RTCRayHit16 rayhit;
   alignas(64) int valid[kLanes];
+  std::uint32_t tinted = 0;  // bits of lanes whose rays passed through surfaces that give light a colour
+  Vec3Lanes passed;          // of these: the factor on light that comes along the ray
 
   /// Sets no lane, and the fields that are the same for all rays.
   RayPacket();
@@ -43,6 +45,8 @@ struct alignas(64) RayPacket {
   Vec3Lanes directions() const;
   bool hit(int lane) const { return valid[lane] != 0 && rayhit.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID; }
   bool missed(int lane) const { return valid[lane] != 0 && rayhit.hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID; }
+  /// Returns the factor on light that comes along the ray.
+  Vec3 tint(std::size_t lane) const { return (tinted >> lane & 1u) != 0 ? passed[lane] : Vec3(1.0f); }
 };
 
 /// Holds up to 16 rays that ask only whether anything lies between their ends.
@@ -50,6 +54,8 @@ struct alignas(64) ShadowPacket {
   RTCRay16 ray;
   alignas(64) int valid[kLanes];
   bool any = false;
+  std::uint32_t tinted = 0;  // as in RayPacket
+  Vec3Lanes passed;
 
   ShadowPacket();
   void clear();
@@ -182,11 +188,14 @@ class RayScene {
   /// Benchmarks that call Embree themselves use this.
   RTCScene embreeScene() const { return top_.get(); }
   std::size_t alphaTestedParts() const { return alphaTested_.size(); }
+  /// Tells whether any surface gives a colour to light that passes.
+  bool tints() const { return tints_; }
 
  private:
   struct AlphaTested {
     const Materials* materials;
     const Primitive* primitive;
+    bool transmits;
   };
   RayScene(const Scene& scene, const Materials& materials) : scene_(&scene), materials_(&materials) {}
   Expected<void> buildGeometry(std::size_t mostFlattened);
@@ -194,6 +203,7 @@ class RayScene {
   EmbreeGeometry triangles(const Primitive& primitive, const Mat4* worldFromObject, const Vec3** vertices);
   Expected<RTCScene> meshScene(int mesh);
   static void alphaFilter(const RTCFilterFunctionNArguments* args);
+  void findTints(RayPacket& rays) const;
 
   const Scene* scene_;
   const Materials* materials_;
@@ -203,6 +213,7 @@ class RayScene {
   std::vector<ScenePart> parts_;
   std::vector<std::uint32_t> partOfGeometry_;              // per geometry of top_: its part, or an instance's first
   std::vector<std::unique_ptr<AlphaTested>> alphaTested_;  // Embree holds pointers to them
+  bool tints_ = false;
   Vec3 boundsMin_{0};
   Vec3 boundsMax_{0};
 };

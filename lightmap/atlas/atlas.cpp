@@ -20,6 +20,10 @@ namespace {
 std::string figures(const UvReport& r) {
   if (!r.present) return "has no TEXCOORD_1";
   char text[200];
+  if (r.outOfRangeVertices == 0 && r.isTooNarrow()) {
+    std::snprintf(text, sizeof text, "all UVs lie within %.2g texels of the page", r.extentTexels);
+    return text;
+  }
   std::snprintf(text, sizeof text,
                 "%zu vertices outside 0..1, %.1f of %.1f texels covered twice, %zu triangles without area",
                 r.outOfRangeVertices, r.overlapTexels, r.coveredTexels, r.zeroAreaTriangles);

@@ -39,7 +39,13 @@ struct UvReport {
   std::size_t zeroAreaTriangles = 0;
   double overlapTexels = 0.0;  // texel area covered more than once, in texels of the page
   double coveredTexels = 0.0;
+  double extentTexels = 0.0;            // longer side of the box around all UVs, where these are in range
   std::size_t frameCrossingTexels = 0;  // texels in charts that cross a break of the material's tangent frame
+
+  /// UVs narrower than this on a page, in texels, hold one value for the whole object at best.
+  static constexpr double kLeastExtentTexels = 0.1;
+  /// Tells whether the UVs have area, but as good as none on the page.
+  bool isTooNarrow() const { return extentTexels > 0.0 && extentTexels < kLeastExtentTexels; }
 };
 
 /// Figures of the parameterization for logs, bake.json and `lumel info`.

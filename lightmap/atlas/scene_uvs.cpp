@@ -68,7 +68,14 @@ Examination examine(const Scene& scene, const Instance& instance, int pageSize) 
         report.coveredTexels += UvPoints::kTexelsPerPoint;
       points.set(i);
     });
-  report.valid = !result.triangles.empty() && lost <= kLostSurfaceShare * surface &&
+  Vec2d least(pageSize), most(0.0);
+  for (const std::array<Vec2d, 3>& uv : result.triangles)
+    for (const Vec2d& q : uv) {
+      least = glm::min(least, q);
+      most = glm::max(most, q);
+    }
+  report.extentTexels = result.triangles.empty() ? 0.0 : std::max(most.x - least.x, most.y - least.y);
+  report.valid = !result.triangles.empty() && !report.isTooNarrow() && lost <= kLostSurfaceShare * surface &&
                  tolerable(report.overlapTexels, report.coveredTexels);
   return result;
 }

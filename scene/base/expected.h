@@ -12,6 +12,7 @@ enum class ErrorKind {
   Failed,       // exit 1: the work itself failed (no disk space, out of memory)
   Usage,        // exit 2: the command line or config is wrong
   Input,        // exit 3: a file that was given is wrong
+  Threshold,    // exit 4: done, but beyond a threshold that was asked for
   Interrupted,  // exit 130: Ctrl-C
 };
 

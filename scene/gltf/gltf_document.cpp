@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <optional>
 #include <string_view>
@@ -23,7 +24,7 @@ using Json = nlohmann::json;
 // Deeper than any real document (extras included), shallow enough for parsers that recurse.
 constexpr int kMaxJsonDepth = 128;
 
-constexpr std::array<std::string_view, 11> kHandledExtensions = {
+constexpr std::array<std::string_view, 13> kHandledExtensions = {
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_texture_transform",
@@ -35,6 +36,8 @@ constexpr std::array<std::string_view, 11> kHandledExtensions = {
     "KHR_draco_mesh_compression",
     "EXT_mesh_gpu_instancing",
     "KHR_materials_pbrSpecularGlossiness",  // its diffuse part, all a lightmap needs
+    "KHR_materials_transmission",
+    "KHR_texture_basisu",  // its fallback image, or none
 };
 
 struct Chunks {
@@ -130,16 +133,64 @@ std::optional<Error> checkAsset(const Json& root, const std::string& name) {
   return std::nullopt;
 }
 
-std::optional<Error> checkRequiredExtensions(const Json& root, const std::string& name) {
+/// Tells whether any "extensions" object inside of `json` names the extension.
+bool usesExtension(const Json& json, const std::string& name) {
+  if (json.is_object()) {
+    if (const auto it = json.find("extensions"); it != json.end() && it->is_object() && it->contains(name)) return true;
+  } else if (!json.is_array()) {
+    return false;
+  }
+  return std::any_of(json.begin(), json.end(), [&](const Json& item) { return usesExtension(item, name); });
+}
+
+std::optional<Error> checkRequiredExtensions(const Json& root, GltfDocument& document) {
   const auto required = root.find("extensionsRequired");
   if (required == root.end() || !required->is_array()) return std::nullopt;
   for (const Json& extension : *required) {
     if (!extension.is_string()) continue;
     const auto& text = extension.get_ref<const std::string&>();
-    if (std::find(kHandledExtensions.begin(), kHandledExtensions.end(), text) == kHandledExtensions.end())
-      return inputError(name + ": extensionsRequired: '" + text + "' is not supported; export without it");
+    if (std::find(kHandledExtensions.begin(), kHandledExtensions.end(), text) != kHandledExtensions.end()) continue;
+    if (usesExtension(root, text))
+      return document.error("extensionsRequired", "'" + text + "' is not supported; export without it");
+    document.warnings.push_back(document.name + ": extensionsRequired: '" + text +
+                                "' is not supported; nothing in the file uses it");
   }
   return std::nullopt;
+}
+
+/// Makes integers of the numbers that are whole but written with a fraction (1.0). Returns whether there was any.
+bool makeWholeNumbers(Json& json) {
+  bool any = false;
+  if (json.is_number_float()) {
+    const auto value = json.get<double>();
+    if (value < 0.0 || value > 9007199254740992.0 || value != std::floor(value)) return false;  // 2^53
+    json = static_cast<std::uint64_t>(value);
+    return true;
+  }
+  if (json.is_structured())
+    for (Json& item : json) any = makeWholeNumbers(item) || any;
+  return any;
+}
+
+/// Checks the document by the schema. Some writers print whole numbers as 1.0, which glTF does not allow for integers:
+/// these are read with a warning.
+std::optional<Error> checkSchema(Json& root, GltfDocument& document) {
+  const auto problem = checkGltfSchema(root);
+  if (!problem) return std::nullopt;
+  if (!makeWholeNumbers(root)) return inputError(document.name + ": " + *problem);
+  if (const auto other = checkGltfSchema(root)) return inputError(document.name + ": " + *other);
+  document.warnings.push_back(document.name + ": " + *problem + "; numbers written as 1.0 are read as 1");
+  return std::nullopt;
+}
+
+/// KHR_lights_punctual asks for ranges above 0; tinygltf's lights do not tell 0 from none.
+void warnOfRanges(const Json& root, GltfDocument& document) {
+  const Json::json_pointer lights("/extensions/KHR_lights_punctual/lights");
+  if (!root.contains(lights)) return;
+  for (const Json& light : root.at(lights))
+    if (light.contains("range") && !(light["range"].get<double>() > 0.0))
+      document.warnings.push_back(document.name + ": light '" + light.value("name", "") +
+                                  "': a range must be above 0; it is left out");
 }
 
 Expected<GltfBuffer> loadBuffer(const GltfDocument& document, const Json& json, std::size_t index,
@@ -160,15 +211,18 @@ Expected<GltfBuffer> loadBuffer(const GltfDocument& document, const Json& json, 
     auto file = resolveReference(document.folder, percentDecode(uri), document.options);
     if (!file) return document.error(place + "/uri", file.error().message);
     auto bytes = readFile(*file);
-    if (!bytes) return document.error(place, bytes.error().message + "; put the buffer beside the scene file");
+    if (!bytes) {
+      buffer.problem = bytes.error().message + "; put the buffer beside the scene file";
+      return buffer;
+    }
     buffer.owned = *std::move(bytes);
     buffer.bytes = buffer.owned;
   }
   const auto length = json["byteLength"].get<std::uint64_t>();
   if (length > buffer.bytes.size())
-    return document.error(place, "has " + std::to_string(buffer.bytes.size()) + " of its " + std::to_string(length) +
-                                     " bytes; export or copy the file again");
-  buffer.bytes = buffer.bytes.first(length);
+    buffer.problem = "has " + std::to_string(buffer.bytes.size()) + " of its " + std::to_string(length) +
+                     " bytes; export or copy the file again";
+  buffer.bytes = buffer.bytes.first(std::min<std::size_t>(length, buffer.bytes.size()));
   buffer.present = true;
   return buffer;
 }
@@ -205,10 +259,13 @@ Expected<std::span<const std::uint8_t>> GltfDocument::viewBytes(int view) const 
   if (!decodedViews[index].empty()) return std::span<const std::uint8_t>(decodedViews[index]);
   const auto& v = model.bufferViews[index];
   const GltfBuffer& buffer = buffers[static_cast<std::size_t>(v.buffer)];
+  const bool fits = v.byteOffset <= buffer.bytes.size() && v.byteLength <= buffer.bytes.size() - v.byteOffset;
+  if (!buffer.problem.empty() && !(buffer.present && fits))
+    return error("buffers/" + std::to_string(v.buffer), buffer.problem);
   if (!buffer.present)
     return error(place, "buffers/" + std::to_string(v.buffer) +
                             " has neither a uri nor a GLB chunk; export or copy the file again");
-  if (v.byteOffset > buffer.bytes.size() || v.byteLength > buffer.bytes.size() - v.byteOffset)
+  if (!fits)
     return error(place, std::to_string(v.byteLength) + " bytes from " + std::to_string(v.byteOffset) +
                             " on do not fit buffers/" + std::to_string(v.buffer) + ", which has " +
                             std::to_string(buffer.bytes.size()) + "; export or copy the file again");
@@ -233,13 +290,17 @@ Expected<GltfDocument> openGltf(std::vector<std::uint8_t> bytes, const std::stri
   auto root = parseJson(chunks->json, name);
   if (!root) return root.error();
   if (auto error = checkAsset(*root, name)) return *error;
-  if (auto error = checkRequiredExtensions(*root, name)) return *error;
-  if (auto problem = checkGltfSchema(*root)) return inputError(name + ": " + *problem);
+  if (auto error = checkRequiredExtensions(*root, document)) return *error;
+  if (auto error = checkSchema(*root, document)) return *error;
+  warnOfRanges(*root, document);
 
   if (root->contains("buffers"))
     for (const Json& json : (*root)["buffers"]) {
       auto buffer = loadBuffer(document, json, document.buffers.size(), chunks->bin);
       if (!buffer) return buffer.error();
+      if (!buffer->problem.empty())
+        document.warnings.push_back(name + ": buffers/" + std::to_string(document.buffers.size()) + ": " +
+                                    buffer->problem + " (nothing that is needed lies there)");
       document.buffers.push_back(*std::move(buffer));
     }
   if (root->contains("images"))

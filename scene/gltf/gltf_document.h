@@ -23,7 +23,8 @@ namespace lumel {
 struct GltfBuffer {
   std::vector<std::uint8_t> owned;
   std::span<const std::uint8_t> bytes;  // into `owned` or the container
-  bool present = false;                 // false: neither uri nor GLB chunk (fallback buffers of meshopt)
+  bool present = false;                 // false: neither uri nor GLB chunk (fallback buffers of meshopt), or no file
+  std::string problem;                  // an error once something reads what is not there; else a warning
 };
 
 struct GltfImage {
@@ -42,6 +43,7 @@ struct GltfDocument {
   std::vector<std::uint8_t> container;  // the file's bytes; a GLB's BIN chunk is read in place
   std::vector<GltfBuffer> buffers;
   std::vector<GltfImage> images;
+  std::vector<std::string> warnings;
   std::vector<std::vector<std::uint8_t>> decodedViews;  // per buffer view; empty unless meshopt-compressed
 
   GltfDocument() = default;

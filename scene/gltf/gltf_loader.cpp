@@ -29,6 +29,7 @@ Expected<Scene> load(std::vector<std::uint8_t> bytes, const std::string& name, c
   auto document = openGltf(std::move(bytes), name, folder, options);
   if (!document) return document.error();
   Scene scene;
+  scene.report.warnings = document->warnings;
   if (auto loaded = loadMaterials(*document, scene); !loaded) return loaded.error();
   auto uses = flattenNodes(*document, scene);
   if (!uses) return uses.error();

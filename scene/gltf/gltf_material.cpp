@@ -12,6 +12,7 @@ namespace {
 constexpr int kClampToEdge = 33071;
 constexpr int kMirroredRepeat = 33648;
 constexpr int kNearest = 9728;
+constexpr std::size_t kNoImage = static_cast<std::size_t>(-1);
 
 Wrap wrapOf(int mode) {
   return mode == kClampToEdge ? Wrap::Clamp : mode == kMirroredRepeat ? Wrap::Mirror : Wrap::Repeat;
@@ -46,6 +47,7 @@ class MaterialLoader {
   Material convert(const tinygltf::Material& source);
   TextureRef texture(int textureIndex, int texCoord, const tinygltf::Value* transform);
   int image(int fileImage);
+  int noImage();
   Expected<ImageSource> load(const GltfImage& image, std::size_t index);
 
   const GltfDocument& document_;
@@ -63,6 +65,14 @@ int MaterialLoader::image(int fileImage) {
   return slot;
 }
 
+/// Returns the place of an image without bytes, which is shared by all textures that have none that can be read.
+int MaterialLoader::noImage() {
+  const auto it = std::find(wanted_.begin(), wanted_.end(), kNoImage);
+  const auto slot = static_cast<int>(it - wanted_.begin());
+  if (it == wanted_.end()) wanted_.push_back(kNoImage);
+  return slot;
+}
+
 TextureRef MaterialLoader::texture(int textureIndex, int texCoord, const tinygltf::Value* transform) {
   TextureRef ref;
   if (textureIndex < 0) return ref;
@@ -70,12 +80,15 @@ TextureRef MaterialLoader::texture(int textureIndex, int texCoord, const tinyglt
   int fileImage = source.source;
   if (const auto* webp = findExtension(source.extensions, "EXT_texture_webp"))
     fileImage = static_cast<int>(valueNumber(*webp, "source", fileImage));
-  if (fileImage < 0) {
-    scene_.report.warnings.push_back(document_.name + ": textures/" + std::to_string(textureIndex) +
-                                     ": has no image that can be read; the material's factor applies alone");
-    return ref;
+  const bool isReadable = fileImage >= 0;
+  if (!isReadable) {
+    const bool basisu = findExtension(source.extensions, "KHR_texture_basisu") != nullptr;
+    scene_.report.warnings.push_back(
+        document_.name + ": textures/" + std::to_string(textureIndex) + ": has no image " +
+        (basisu ? "beside that of KHR_texture_basisu, which is not read; export PNG, too" : "that can be read") +
+        "; colour counts as grey, emission as black");
   }
-  ref.image = image(fileImage);
+  ref.image = isReadable ? image(fileImage) : noImage();
   ref.uvSet = texCoord;
   if (source.sampler >= 0) {
     const auto& sampler = document_.model.samplers[static_cast<std::size_t>(source.sampler)];
@@ -114,6 +127,12 @@ Material MaterialLoader::convert(const tinygltf::Material& source) {
   material.unlit = findExtension(source.extensions, "KHR_materials_unlit") != nullptr;
   if (const auto* strength = findExtension(source.extensions, "KHR_materials_emissive_strength"))
     material.emission *= toFloat(valueNumber(*strength, "emissiveStrength", 1.0));
+  if (const auto* thin = findExtension(source.extensions, "KHR_materials_transmission")) {
+    material.transmission = std::clamp(toFloat(valueNumber(*thin, "transmissionFactor", 0.0)), 0.0f, 1.0f);
+    if (material.transmission > 0.0f && thin->Has("transmissionTexture"))
+      scene_.report.warnings.push_back(document_.name + ": material '" + source.name +
+                                       "': transmissionTexture is not read; transmissionFactor applies everywhere");
+  }
   if (const auto* specular = findExtension(source.extensions, "KHR_materials_pbrSpecularGlossiness")) {
     // It takes the place of the other model, whose members are for programs that do not know it.
     material.baseColor = Vec4(1.0f);
@@ -142,7 +161,7 @@ Expected<ImageSource> MaterialLoader::load(const GltfImage& image, std::size_t i
                                                             : image.name;
   const auto missing = [&](const std::string& why) {
     scene_.report.warnings.push_back(document_.name + ": " + place + ": " + why +
-                                     "; the material's factor applies alone");
+                                     "; colour counts as grey, emission as black");
     source.encoded.clear();
     return source;
   };
@@ -176,6 +195,10 @@ Expected<void> MaterialLoader::run() {
   });
   if (needsDefault || scene_.materials.empty()) scene_.materials.push_back(defaultMaterial());
   for (const std::size_t index : wanted_) {
+    if (index == kNoImage) {
+      scene_.images.push_back({.name = "no image", .mimeType = "", .encoded = {}});
+      continue;
+    }
     auto source = load(document_.images[index], index);
     if (!source) return source.error();
     scene_.images.push_back(*std::move(source));

@@ -219,6 +219,18 @@ std::optional<Error> NodeFlattener::addMesh(std::size_t index) {
   return std::nullopt;
 }
 
+/// Sets the cone of a spot light, within what KHR_lights_punctual allows.
+template <class Warn>
+void setCone(const tinygltf::Light& source, Light& light, const Warn& warn) {
+  constexpr double kHalfPi = 1.5707964;  // pi / 2 as a float has it: what exporters write
+  const double inner = source.spot.innerConeAngle, outer = source.spot.outerConeAngle;
+  if (light.type == LightType::Spot && !(inner >= 0 && outer > 0 && inner <= outer && outer <= kHalfPi))
+    warn("its cone from " + std::to_string(inner) + " to " + std::to_string(outer) +
+         " is outside of the format (0 <= inner < outer <= pi/2); it is cut to that");
+  light.outerConeAngle = static_cast<float>(std::clamp(outer, 0.0, static_cast<double>(kPi) / 2));
+  light.innerConeAngle = static_cast<float>(std::clamp(inner, 0.0, static_cast<double>(light.outerConeAngle)));
+}
+
 void NodeFlattener::addLight(std::size_t node, int index) {
   const auto& source = document_.model.lights[static_cast<std::size_t>(index)];
   Light light;
@@ -226,14 +238,19 @@ void NodeFlattener::addLight(std::size_t node, int index) {
   light.type = source.type == "spot"          ? LightType::Spot
                : source.type == "directional" ? LightType::Directional
                                               : LightType::Point;
-  if (source.color.size() == 3)
+  const auto warn = [&](const std::string& problem) {
+    scene_.report.warnings.push_back(document_.name + ": light '" + light.name + "': " + problem);
+  };
+  if (source.color.size() == 3) {
+    if (std::any_of(source.color.begin(), source.color.end(), [](double c) { return c < 0; }))
+      warn("its colour is negative and counts as 0 there");
     for (int c = 0; c < 3; ++c)
       light.color[c] = static_cast<float>(std::max(source.color[static_cast<std::size_t>(c)], 0.0));
+  }
+  if (source.intensity < 0) warn("its intensity is negative; it gives no light");
   light.intensity = static_cast<float>(std::max(source.intensity, 0.0));
   light.range = static_cast<float>(std::max(source.range, 0.0));
-  const double outer = std::clamp(source.spot.outerConeAngle, 0.0, static_cast<double>(kPi) / 2);
-  light.outerConeAngle = static_cast<float>(outer);
-  light.innerConeAngle = static_cast<float>(std::clamp(source.spot.innerConeAngle, 0.0, outer));
+  setCone(source, light, warn);
   const glm::dmat4& world = worldFromNode_[node];
   light.position = Vec3(glm::dvec3(world[3]));
   const glm::dvec3 away = -glm::dvec3(world[2]);

@@ -349,6 +349,10 @@ void Checker::material(const Json& material) {
     fields(specular, kSpecular);
     textureInfo(specular, "diffuseTexture");
   });
+  extension(material, "KHR_materials_transmission", [&](const Json& thin) {
+    static constexpr Field kThin[] = {{"transmissionFactor", Type::Number}};
+    fields(thin, kThin);
+  });
   extension(material, "KHR_materials_emissive_strength", [&](const Json& emissive) {
     static constexpr Field kStrength[] = {{"emissiveStrength", Type::Number}};
     fields(emissive, kStrength);

@@ -69,6 +69,7 @@ std::optional<std::string> checkCorner(std::string_view token, const Counts& soF
     const auto [stop, error] = std::from_chars(part.data(), part.data() + part.size(), index);
     if (error != std::errc() || stop != part.data() + part.size())
       return "a face with '" + std::string(part.substr(0, 40)) + "', which is not an index";
+    if (kind == 2 && index > 0 && total[kind] == 0) continue;  // "v//vn" without normals: see parseObj
     if (index == 0 || index > total[kind] || index < -soFar[kind])
       return std::string("a face refers to ") + kKinds[kind] + " " + std::to_string(index) + ", but there are " +
              std::to_string(index < 0 ? soFar[kind] : total[kind]);

@@ -50,11 +50,11 @@ Expected<int> ObjMaterialLoader::image(const std::string& file) {
     source.mimeType = imageMimeType(source.encoded);
     if (source.mimeType.empty() && lowerCaseExtension(file) == ".tga") source.mimeType = "image/x-tga";
     if (source.mimeType.empty()) {
-      warn("MTL: '" + file + "' is not an image of a known type; the material's colour applies alone");
+      warn("MTL: '" + file + "' is not an image of a known type; colour counts as grey, emission as black");
       source.encoded.clear();
     }
   } else {
-    warn("MTL: " + bytes.error().message + "; the material's colour applies alone");
+    warn("MTL: " + bytes.error().message + "; colour counts as grey, emission as black");
   }
   const int index = static_cast<int>(scene_.images.size());
   scene_.images.push_back(std::move(source));

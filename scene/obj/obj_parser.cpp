@@ -134,6 +134,18 @@ bool indicesInRange(const ObjFile& file) {
   return true;
 }
 
+/// Some exporters write faces as "v//vn" and leave the normals out.
+void dropNormalsThatAreNot(ObjFile& file, std::vector<std::string>& warnings, const std::string& name) {
+  if (!file.normals.empty()) return;
+  bool any = false;
+  for (ObjShape& shape : file.shapes)
+    for (ObjCorner& corner : shape.corners) {
+      any = any || corner.normal >= 0;
+      corner.normal = -1;
+    }
+  if (any) warnings.push_back(name + ": faces refer to normals, but there are none; they are made");
+}
+
 Expected<ObjFile> parse(std::string_view text, const std::string& name, const std::filesystem::path& folder,
                         const LoadOptions& options) {
   if (const auto problem = checkObjText(text))
@@ -160,6 +172,7 @@ Expected<ObjFile> parse(std::string_view text, const std::string& name, const st
     file.linesAndPoints += shape.lines.num_line_vertices.size() + (shape.points.indices.empty() ? 0 : 1);
     if (!shape.mesh.indices.empty()) file.shapes.push_back(convert(shape));
   }
+  dropNormalsThatAreNot(file, reader.warnings, name);
   if (!indicesInRange(file)) return inputError(name + ": a face cannot be read; export the file again");
   file.warnings = std::move(reader.warnings);
   return file;

@@ -49,6 +49,22 @@ TEST(Finish, InvalidTexelsTakeTheLightOfTheirChart) {
   EXPECT_EQ(f.pages[0].aux.pixels, auxBefore.pixels);
 }
 
+TEST(Finish, HalfsCutWhatIsBeyondThemAndSaySo) {
+  Fixture f;
+  BakeResult result;
+  result.pages = f.pages;
+  result.pages[0].flat.setRgb(0, 0, Vec3(1e6f, 65504.0f, 1.0f));
+  result.pages[0].maps[1].setRgb(1, 0, Vec3(-7e4f, 0.0f, 0.0f));
+  cutToHalf(result);
+  EXPECT_EQ(result.pages[0].flat.rgb(0, 0), Vec3(65504.0f, 65504.0f, 1.0f));
+  EXPECT_EQ(result.pages[0].maps[1].rgb(1, 0), Vec3(-65504.0f, 0.0f, 0.0f));
+  ASSERT_EQ(result.stats.notes.size(), 1u);
+  EXPECT_EQ(result.stats.notes[0],
+            "2 values are beyond 65504, the most that --half holds, and are cut to it; the greatest was 1e+06");
+  cutToHalf(result);
+  EXPECT_EQ(result.stats.notes.size(), 1u);
+}
+
 TEST(Finish, DilationGrowsBeyondWhatIsCovered) {
   Fixture f;
   finishPages(f.pages, f.atlas, f.texels, {.rings = 1});

@@ -117,6 +117,21 @@ TEST(LitSides, ALeakySolidIsTurnedWhereItIsWoundAgainstItsOtherFaces) {
   expectFacing(test.scene, 1.0f);
 }
 
+// A sign just off a wall, wound towards it: some light finds its way between, but people see the other side.
+TEST(LitSides, ASignWoundTowardsItsWallIsTurnedToThoseWhoSeeIt) {
+  for (const bool towardsTheWall : {true, false}) {
+    TestScene test = doubleSided();
+    const int plain = test.addMaterial(Vec3(0.7f));
+    if (towardsTheWall)
+      test.addRectangle({0.5f, 1, 0.2f}, {-1, 0, 0}, {0, 1, 0}, {.material = 0});
+    else
+      test.addRectangle({-0.5f, 1, 0.2f}, {1, 0, 0}, {0, 1, 0}, {.material = 0});
+    test.addRectangle({-3, 0, 0}, {6, 0, 0}, {0, 3, 0}, {.material = plain});
+    test.scene.environment.color = Vec3(1.0f);
+    EXPECT_EQ(turned(test.scene), towardsTheWall ? 2u : 0u);
+  }
+}
+
 TEST(LitSides, SingleSidedSurfacesAreLeftAlone) {
   TestScene test;
   addCube(test, {0, 3});

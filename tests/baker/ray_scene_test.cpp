@@ -135,6 +135,46 @@ TEST(RayScene, BlendLetsItsShareThrough) {
   }
 }
 
+// With transmission t and base colour c a ray brings t c of the light in the mean, for shadow rays and for others, and
+// only what lies before its hit counts.
+TEST(RayScene, TransmissionTintsWhatPasses) {
+  TestScene test;
+  const Vec3 color(0.2f, 0.8f, 0.4f);
+  const int glass = test.addMaterial(color);
+  test.scene.materials[static_cast<std::size_t>(glass)].transmission = 0.5f;
+  test.addRectangle({-1, 1, -1}, {2, 0, 0}, {0, 0, 2}, {.material = glass});
+  test.addRectangle({-1, 2, -1}, {2, 0, 0}, {0, 0, 2});                       // a wall behind it
+  test.addRectangle({-1, 3, -1}, {2, 0, 0}, {0, 0, 2}, {.material = glass});  // behind the wall: it must not count
+  const Built built(test.scene);
+  EXPECT_TRUE(built.rays->tints());
+  for (const TraceMode mode : kModes) {
+    Vec3d shadows(0.0), hits(0.0);
+    constexpr int kRays = 1 << 14;
+    for (std::uint32_t i = 0; i < kRays; i += kLanes) {
+      ShadowPacket shadow;
+      RayPacket rays;
+      for (int lane = 0; lane < kLanes; ++lane) {
+        const Vec2 u = sobol2D(i + static_cast<std::uint32_t>(lane), 4) * 1.6f - 0.8f;
+        shadow.set(lane, {u.x, 0, u.y}, {0, 1, 0}, 1.5f);
+        rays.set(lane, {u.x, 0, u.y}, {0, 1, 0});
+      }
+      built.rays->occluded(shadow, mode);
+      built.rays->intersect(rays, mode);
+      for (int lane = 0; lane < kLanes; ++lane) {
+        const auto l = static_cast<std::size_t>(lane);
+        if (shadow.visible(lane)) shadows += Vec3d((shadow.tinted >> l & 1u) != 0 ? shadow.passed[l] : Vec3(1.0f));
+        if (rays.rayhit.ray.tfar[lane] > 1.5f) hits += Vec3d(rays.tint(l));
+      }
+    }
+    // 0.5 times 0.8 of the rays pass; four standard deviations of that, in each colour at most 1 a ray.
+    const double tolerance = 4 * std::sqrt(0.4 * 0.6 / kRays);
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(shadows[c] / kRays, 0.5 * static_cast<double>(color[c]), tolerance);
+      EXPECT_NEAR(hits[c] / kRays, 0.5 * static_cast<double>(color[c]), tolerance);
+    }
+  }
+}
+
 // A mesh placed twice by Embree must answer as the same triangles in world space do.
 TEST(RayScene, InstancesAnswerAsFlattenedGeometryDoes) {
   TestScene once;

@@ -101,6 +101,25 @@ TEST(Transport, BlendHoldsItsShare) {
 
 // Bounce light of one wall onto the floor, by closed form: a wall of albedo rho lit by a sun that does not reach the
 // floor is a lamp of radiance rho E cos / pi.
+/// A pane between a floor and an even sky: the floor has transmission times base colour of it, by both integrators.
+TEST(Transport, GlassTintsTheSky) {
+  const Vec3 color(0.2f, 0.8f, 0.4f);
+  for (const Integrator integrator : {Integrator::Path, Integrator::Gather}) {
+    TestScene test;
+    test.integrator = integrator;
+    test.addRectangle({-1, 0, 1}, {2, 0, 0}, {0, 0, -2}, {.texels = 2});
+    const int glass = test.addMaterial(color);
+    test.scene.materials[static_cast<std::size_t>(glass)].transmission = 0.5f;
+    // So large that next to nothing of the hemisphere is left around it.
+    test.addRectangle({-1000, 1, -1000}, {2000, 0, 0}, {0, 0, 2000}, {.material = glass, .texels = 0});
+    test.scene.environment.color = Vec3(1.0f);
+    const BakeResult result = test.bake({.samples = 4096, .bounces = 0});
+    const Vec3 light = result.pages[0].flat.rgb(0, 0);
+    // 4096 rays, 0.4 of which pass: 2% is two and a half standard deviations of a plain draw, and draws are stratified.
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(light[c], 0.5f * color[c], 0.02f * 0.5f + 0.02f * 0.5f * color[c]);
+  }
+}
+
 TEST(Transport, OneBounceIsALamp) {
   for (const bool unlit : {false, true}) {
     TestScene test;

@@ -116,6 +116,7 @@ TEST(ExitCodes, WrongInputIs3) {
   EXPECT_TRUE(fails(run({"bake", dir / "broken.gltf", "-o", out}), 3, {"broken.gltf"}));
   nlohmann::json unknown = gltfOf({floorQuad()});
   unknown["extensionsUsed"] = unknown["extensionsRequired"] = {"EXT_from_the_future"};
+  unknown["nodes"][0]["extensions"]["EXT_from_the_future"] = nlohmann::json::object();
   writeFile(dir / "future.gltf", unknown.dump());
   EXPECT_TRUE(fails(run({"bake", dir / "future.gltf", "-o", out}), 3, {"future.gltf", "EXT_from_the_future"}));
   EXPECT_TRUE(fails(run({"bake", floorScene(dir), "-o", out, "--sky", dir / "none.hdr"}), 3, {"none.hdr"}));
@@ -141,6 +142,28 @@ TEST(ExitCodes, NothingToBakeIsAWarning) {
   const Outcome outcome = run({"bake", dir / "lines.gltf", "-o", dir / "out", "--sky-color", "1", "1", "1"});
   EXPECT_EQ(outcome.exitCode, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("no triangle of the scene gets a lightmap"), std::string::npos) << outcome.err;
+}
+
+TEST(ExitCodes, StrictIs4AndWritesAllTheSame) {
+  const auto dir = scratch();
+  const std::string scene = floorScene(dir);
+  const std::vector<std::string> plain = {"--samples", "4", "--page-size", "16"};
+  const auto bakeTo = [&](const std::string& out, std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"bake", scene, "-o", dir / out};
+    arguments.insert(arguments.end(), plain.begin(), plain.end());
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  };
+  // Without a light there is a warning.
+  EXPECT_EQ(bakeTo("a", {}).exitCode, 0);
+  EXPECT_TRUE(fails(bakeTo("b", {"--strict"}), 4, {"--strict: 1 warning", "bake.json"}));
+  EXPECT_EQ(readFile(dir / "a" / "lightmap-0-flat.exr"), readFile(dir / "b" / "lightmap-0-flat.exr"));
+  EXPECT_EQ(bakeTo("c", {"--strict", "--sky-color", "1", "1", "1"}).exitCode, 0);
+  // A sky of 1e5 nits is beyond halfs: known before the bake, and cut.
+  const Outcome half = bakeTo("d", {"--half", "--sky-color", "100000", "100000", "100000"});
+  EXPECT_EQ(half.exitCode, 0) << half.err;
+  EXPECT_NE(half.err.find("the sky alone brings 1e+05, and --half ends at 65504"), std::string::npos) << half.err;
+  EXPECT_NE(half.err.find("are cut to it"), std::string::npos) << half.err;
 }
 
 TEST(ExitCodes, OutputThatCannotBeWrittenIs1BeforeTheWork) {

@@ -93,6 +93,19 @@ TEST(SceneUvs, OutsideThePageOrNotFiniteAreInvalid) {
   }
 }
 
+TEST(SceneUvs, ThatAreTooNarrowForTexelsAreReportedAndReplaced) {
+  // 1e-6 of a page of 64 texels.
+  const Scene scene = litScene({litSquare(0, {0, 0}, {1e-6f, 1e-6f})});
+  const Expected<AtlasResult> result = withSceneUvs(scene, UvSource::Auto);
+  ASSERT_TRUE(result);
+  EXPECT_FALSE(result->report.sceneUvs.at(0).valid);
+  EXPECT_EQ(result->report.generatedCharts, 1u);
+  ASSERT_EQ(result->report.warnings.size(), 1u);
+  EXPECT_NE(result->report.warnings[0].find("all UVs lie within 6.4e-05 texels"), std::string::npos)
+      << result->report.warnings[0];
+  EXPECT_FALSE(withSceneUvs(scene, UvSource::Scene));
+}
+
 TEST(SceneUvs, MirroredChartsGetALeftHandedFrame) {
   Primitive p = litSquare(0, {0, 0}, {1, 1});
   for (Vec2& uv : p.uvSets[1]) uv.x = 1 - uv.x;

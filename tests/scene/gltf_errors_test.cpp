@@ -66,12 +66,66 @@ TEST(GltfErrors, Json) {
 TEST(GltfErrors, RequiredExtensionsAreNamed) {
   EXPECT_EQ(broken([](auto& g) {
               g.json["extensionsRequired"] = {"KHR_texture_transform", "ACME_teapots"};
+              g.json["nodes"][0]["extensions"]["ACME_teapots"] = Json::object();
             }),
             "test.glb: extensionsRequired: 'ACME_teapots' is not supported; export without it");
   EXPECT_EQ(broken([](auto& g) {
               g.json["extensionsUsed"] = {"ACME_teapots", "KHR_materials_variants"};
             }),
             "(it loads)");
+}
+
+/// The warnings of a square that was changed, one per line.
+template <class Change>
+std::string warningsOf(const Change& change) {
+  GltfBuilder g;
+  g.square();
+  change(g);
+  const auto scene = g.load();
+  if (!scene) return "(it does not load) " + scene.error().message;
+  std::string all;
+  for (const std::string& warning : scene->report.warnings) all += warning + "\n";
+  return all;
+}
+
+TEST(GltfErrors, RequiredExtensionsThatNothingUsesAreWarnedOf) {
+  EXPECT_EQ(warningsOf([](auto& g) { g.json["extensionsRequired"] = {"ACME_teapots"}; }),
+            "test.glb: extensionsRequired: 'ACME_teapots' is not supported; nothing in the file uses it\n");
+}
+
+TEST(GltfErrors, WholeNumbersWrittenWithAFractionAreRead) {
+  EXPECT_EQ(
+      warningsOf([](auto& g) {
+        g.json["accessors"][0]["count"] = 4.0;
+        g.json["nodes"][0]["mesh"] = 0.0;
+      }),
+      "test.glb: accessors/0/count: must be a whole number, not negative; numbers written as 1.0 are read as 1\n");
+  EXPECT_EQ(broken([](auto& g) { g.json["accessors"][0]["count"] = 4.5; }),
+            "test.glb: accessors/0/count: must be a whole number, not negative");
+}
+
+TEST(GltfErrors, LightsOutsideOfTheFormatAreWarnedOf) {
+  const auto light = [](const Json& json) {
+    return warningsOf([&](auto& g) {
+      g.json["extensions"]["KHR_lights_punctual"]["lights"] = {json};
+      g.json["nodes"].push_back({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+    });
+  };
+  EXPECT_EQ(light({{"type", "point"}, {"name", "L"}, {"intensity", 5}, {"range", 3}}), "");
+  EXPECT_TRUE(
+      mentions(light({{"type", "point"}, {"name", "L"}, {"intensity", -5}}), "light 'L': its intensity is negative"));
+  EXPECT_TRUE(mentions(light({{"type", "point"}, {"color", {-1, 1, 1}}}), "its colour is negative"));
+  for (const int range : {0, -3})
+    EXPECT_TRUE(
+        mentions(light({{"type", "point"}, {"name", "L"}, {"range", range}}), "light 'L': a range must be above 0"));
+  const auto spot = [&](double inner, double outer) {
+    return light({{"type", "spot"}, {"spot", {{"innerConeAngle", inner}, {"outerConeAngle", outer}}}});
+  };
+  EXPECT_EQ(spot(0.2, 0.5), "");
+  EXPECT_EQ(spot(0.0, 1.5707964), "");  // pi / 2 as a float
+  EXPECT_TRUE(mentions(spot(0.8, 0.3), "is outside of the format"));
+  EXPECT_TRUE(mentions(spot(0.2, 2.5), "is outside of the format"));
+  EXPECT_TRUE(mentions(spot(0.0, 0.0), "is outside of the format"));
 }
 
 TEST(GltfErrors, IndicesOutOfRangeInTheJson) {
@@ -211,6 +265,55 @@ TEST_F(GltfFiles, MissingAndShortBuffers) {
   EXPECT_TRUE(mentions(errorOf(loadWith("short.bin")), "buffers/0: has 40 of its "));
   EXPECT_TRUE(mentions(errorOf(loadWith("data:application/octet-stream;base64,!!!")),
                        "buffers/0/uri: is a data URI with a character that is not base64"));
+}
+
+TEST_F(GltfFiles, ABufferThatNothingReadsMayBeMissing) {
+  builder_.json["accessors"].push_back(
+      {{"bufferView", builder_.json["bufferViews"].size()}, {"componentType", 5126}, {"count", 1}, {"type", "SCALAR"}});
+  builder_.json["bufferViews"].push_back({{"buffer", 1}, {"byteLength", 4}});
+  write(folder_ / "scene" / "here.bin", binText());
+  builder_.json["buffers"] = {{{"uri", "here.bin"}, {"byteLength", builder_.bin.size()}},
+                              {{"uri", "gone.bin"}, {"byteLength", 4}}};
+  write(folder_ / "scene" / "level.gltf", builder_.json.dump());
+  LOAD_OR_FAIL(scene, loadScene(folder_ / "scene" / "level.gltf", {}));
+  ASSERT_EQ(scene.report.warnings.size(), 1u);
+  EXPECT_TRUE(mentions(scene.report.warnings[0], "buffers/1: "));
+  EXPECT_TRUE(mentions(scene.report.warnings[0], "gone.bin: no such file"));
+}
+
+TEST_F(GltfFiles, MissingTexturesAreGreyAndDark) {
+  write(folder_ / "scene" / "here.bin", binText());
+  builder_.json["buffers"] = {{{"uri", "here.bin"}, {"byteLength", builder_.bin.size()}}};
+  builder_.json["images"] = {{{"uri", "gone.png"}}};
+  // The second texture has an image that only KHR_texture_basisu names.
+  builder_.json["textures"] = {{{"source", 0}}, {{"extensions", {{"KHR_texture_basisu", {{"source", 0}}}}}}};
+  builder_.json["extensionsRequired"] = {"KHR_texture_basisu"};
+  for (const int texture : {0, 1}) {
+    builder_.json["materials"] = {
+        {{"pbrMetallicRoughness", {{"baseColorFactor", {1, 0.5, 1, 0.25}}, {"baseColorTexture", {{"index", texture}}}}},
+         {"emissiveFactor", {1, 1, 1}},
+         {"emissiveTexture", {{"index", texture}}}}};
+    builder_.json["meshes"][0]["primitives"][0]["material"] = 0;
+    write(folder_ / "scene" / "level.gltf", builder_.json.dump());
+    LOAD_OR_FAIL(scene, loadScene(folder_ / "scene" / "level.gltf", {}));
+    EXPECT_EQ(scene.materials[0].baseColor, Vec4(kMissingColor, 0.5f * kMissingColor, kMissingColor, 0.25f));
+    EXPECT_EQ(scene.materials[0].emission, Vec3(0.0f));
+    ASSERT_FALSE(scene.report.warnings.empty());
+    EXPECT_TRUE(mentions(scene.report.warnings[0], texture == 0 ? "gone.png" : "KHR_texture_basisu"));
+  }
+}
+
+TEST_F(GltfFiles, LightBeyondFloatsIsCut) {
+  write(folder_ / "scene" / "here.bin", binText());
+  builder_.json["buffers"] = {{{"uri", "here.bin"}, {"byteLength", builder_.bin.size()}}};
+  builder_.json["materials"] = {{{"name", "glow"},
+                                 {"emissiveFactor", {1, 1, 1}},
+                                 {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 1e38}}}}}}};
+  write(folder_ / "scene" / "level.gltf", builder_.json.dump());
+  LOAD_OR_FAIL(scene, loadScene(folder_ / "scene" / "level.gltf", {}));
+  EXPECT_EQ(scene.materials[0].emission, Vec3(kMostIntensity));
+  ASSERT_EQ(scene.report.warnings.size(), 1u);
+  EXPECT_TRUE(mentions(scene.report.warnings[0], "material 'glow' is brighter than 1e32"));
 }
 
 TEST_F(GltfFiles, PathsStayInTheScenesFolderUnlessAllowed) {

@@ -100,6 +100,14 @@ TEST_F(Obj, NormalsOfTheFileAndNegativeIndices) {
   for (const Vec3& n : scene->primitive(0, 0).normals) EXPECT_NEAR(n.y, std::sqrt(0.5f), 1e-6);
 }
 
+TEST_F(Obj, NormalsThatAreNamedButMissingAreMade) {
+  auto scene = load("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1//1 2//2 3//3\n");
+  ASSERT_TRUE(scene) << scene.error().message;
+  for (const Vec3& n : scene->primitive(0, 0).normals) EXPECT_EQ(n, Vec3(0, 0, 1));
+  ASSERT_EQ(scene->report.warnings.size(), 1u);
+  EXPECT_TRUE(mentions(scene->report.warnings[0], "faces refer to normals, but there are none"));
+}
+
 TEST_F(Obj, MaterialsWithoutKdAreWhiteAndMissingFilesWarn) {
   write("m.mtl", "newmtl a\nmap_Kd gone\\away.png\n");
   auto scene = load("mtllib m.mtl\n" + kSquare + "usemtl a\n" + kFace);

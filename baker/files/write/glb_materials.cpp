@@ -59,6 +59,10 @@ class MaterialWriter {
       json["alphaMode"] = "BLEND";
     }
     if (m.doubleSided) json["doubleSided"] = true;
+    if (m.transmission > 0.0f) {
+      json["extensions"]["KHR_materials_transmission"] = {{"transmissionFactor", m.transmission}};
+      out_.extensionsUsed.insert("KHR_materials_transmission");
+    }
     if (m.unlit) {
       json["extensions"]["KHR_materials_unlit"] = Json::object();
       out_.extensionsUsed.insert("KHR_materials_unlit");
