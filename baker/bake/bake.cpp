@@ -312,6 +312,24 @@ BakeOptions optionsFor(const LightTransport& transport, BakeOptions options) {
   return options;
 }
 
+/// Traces the ways across seams, 16 at a time.
+void traceCrossings(const RayScene& rays, std::span<const SeamCrossing> crossings, std::span<std::uint8_t> blocked) {
+  constexpr std::size_t kGrain = 64 * kLanes;
+  parallelFor(crossings.size(), kGrain, [&](std::size_t first, std::size_t last) {
+    ShadowPacket packet;
+    for (std::size_t begin = first; begin < last; begin += kLanes) {
+      const std::size_t count = std::min<std::size_t>(kLanes, last - begin);
+      packet.clear();
+      for (std::size_t i = 0; i < count; ++i) {
+        const SeamCrossing& crossing = crossings[begin + i];
+        packet.set(static_cast<int>(i), crossing.from, crossing.to - crossing.from, 1.0f);
+      }
+      rays.occluded(packet, TraceMode::Packet);
+      for (std::size_t i = 0; i < count; ++i) blocked[begin + i] = packet.visible(static_cast<int>(i)) ? 0 : 1;
+    }
+  });
+}
+
 }  // namespace
 
 Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
@@ -338,6 +356,10 @@ Expected<BakeResult> bake(const LitScene& scene, const Atlas& atlas, const std::
           : tracePaths(transport, atlas, texels, options, result.pages, progress);
   if (!waveStats) return waveStats.error();
 
+  if (options.seams)
+    result.seams = findSeams(atlas, [&](std::span<const SeamCrossing> crossings, std::span<std::uint8_t> blocked) {
+      traceCrossings(transport.rays, crossings, blocked);
+    });
   result.stats = sumUp(*waveStats, options);
   for (const PageTexels& page : texels) result.stats.texels += page.size();
   result.stats.notes.insert(result.stats.notes.begin(), scene.notes().begin(), scene.notes().end());

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "baker/bake/bake_options.h"
+#include "lightmap/seams/seam_maps.h"
+#include "lightmap/seams/seams.h"
 #include "lightmap/surface.h"
 #include "lightmap/texels/texels.h"
 #include "scene/base/expected.h"
@@ -38,11 +40,13 @@ struct BakeStats {
   std::optional<double> meanStandardError;  // mean of aux stderr over the same; none of too few samples
   double projectionResidual = 0.0;  // RMS difference between decoded and true irradiance / pi over sample normals
                                     // within 30 degrees, relative to meanFlat
+  SeamFigures seams;                // known after finishPages alone
   std::vector<std::string> notes;
 };
 
 struct BakeResult {
   std::vector<BakedPage> pages;
+  Seams seams;  // for finishPages; none where the options say so
   BakeStats stats;
 };
 

@@ -33,6 +33,7 @@ struct BakeOptions {
   // the machine.
   float timeBudgetSeconds = 0.0f;
   bool indirectOnly = false;  // without what arrives straight from lights, shining surfaces and the sky
+  bool seams = true;          // find where lookups from both sides of charts' borders shall agree
   std::uint64_t seed = 1;
   std::shared_ptr<const Encoding> encoding = rnmEncoding();
 };

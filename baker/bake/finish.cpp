@@ -17,7 +17,6 @@ constexpr std::size_t kTexelsPerTask = 1024;
 
 /// What is known of a page's texels, row by row.
 struct PageState {
-  TexelMask covered;
   TexelMask valid;
   std::vector<std::uint8_t> holes;      // covered, not valid
   std::vector<std::uint32_t> chartIds;  // 0: none, else chart + 1; the first where several share a texel
@@ -25,9 +24,8 @@ struct PageState {
   bool hasHoles = false;
 };
 
-/// Of the covered part's middle.
-CoarseNormal normalOf(TexelFootprint& footprint) {
-  const Vec3 n = footprint.centroid().frame.n * kCoarseNormal;
+CoarseNormal coarse(const Vec3& normal) {
+  const Vec3 n = normal * kCoarseNormal;
   return {static_cast<std::int8_t>(std::lround(n.x)), static_cast<std::int8_t>(std::lround(n.y)),
           static_cast<std::int8_t>(std::lround(n.z))};
 }
@@ -35,12 +33,11 @@ CoarseNormal normalOf(TexelFootprint& footprint) {
 PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& texels, bool forDenoising) {
   const std::size_t count = page.aux.pixels.size() / 4;
   PageState state;
-  state.covered = state.valid = {page.aux.width, page.aux.height, std::vector<std::uint8_t>(count, 0)};
+  state.valid = {page.aux.width, page.aux.height, std::vector<std::uint8_t>(count, 0)};
   state.holes.assign(count, 0);
   for (std::size_t i = 0; i < count; ++i) {
     const float* aux = page.aux.pixels.data() + i * 4;
     if (!(aux[0] > 0.0f)) continue;
-    state.covered.known[i] = 1;
     (aux[1] < kLeastValidity ? state.holes[i] : state.valid.known[i]) = 1;
   }
   state.hasHoles = std::find(state.holes.begin(), state.holes.end(), 1) != state.holes.end();
@@ -54,36 +51,114 @@ PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& t
       const TriangleRef triangle = texels.trianglesOf(texel).front();
       const std::size_t i = static_cast<std::size_t>(at.y) * static_cast<std::size_t>(page.aux.width) + at.x;
       state.chartIds[i] = atlas.surfaces[triangle.surface].charts[triangle.triangle] + 1;
-      if (forDenoising && footprint.clip(atlas, texels, texel) > 0.0) state.normals[i] = normalOf(footprint);
+      if (forDenoising && footprint.clip(atlas, texels, texel) > 0.0)
+        state.normals[i] = coarse(footprint.centroid().frame.n);
     }
   });
   return state;
 }
 
-void denoisePage(BakedPage& page, const PageState& state) {
+constexpr std::size_t kErrorChannel = 2;
+
+/// The mean of the standard errors of covered texels around one.
+float errorAround(const Image& aux, std::uint32_t texel) {
+  const int x = static_cast<int>(texel) % aux.width, y = static_cast<int>(texel) / aux.width;
+  float sum = 0.0f, count = 0.0f;
+  for (int v = std::max(y - 1, 0); v <= std::min(y + 1, aux.height - 1); ++v)
+    for (int u = std::max(x - 1, 0); u <= std::min(x + 1, aux.width - 1); ++u) {
+      const float* pixel = aux.at(u, v);
+      if (!(pixel[0] > 0.0f) || !std::isfinite(pixel[kErrorChannel])) continue;
+      sum += pixel[kErrorChannel];
+      count += 1.0f;
+    }
+  return count > 0.0f ? sum / count : 0.0f;
+}
+
+/// Makes texels beyond seams part of their charts while noise is taken out: they hold what continues these.
+void addBeyond(const Seams& seams, std::span<const BeyondTexel> beyond, std::vector<std::uint32_t>& charts,
+               PageState& state, BakedPage& page) {
+  for (const BeyondTexel& texel : beyond) {
+    if (charts[texel.texel] != 0) continue;
+    const SeamSide& side = seams.pairs[texel.pair].sides[texel.side];
+    charts[texel.texel] = side.chart + 1;
+    state.normals[texel.texel] = coarse(side.frame.n);
+    page.aux.pixels[std::size_t{4} * texel.texel + kErrorChannel] = errorAround(page.aux, texel.texel);
+  }
+}
+
+void denoisePage(BakedPage& page, PageState& state, const Seams& seams, std::span<const BeyondTexel> beyond) {
   std::vector<std::uint32_t> charts = state.chartIds;
   for (std::size_t i = 0; i < charts.size(); ++i)
     if (state.valid.known[i] == 0) charts[i] = 0;
-  denoise(page.flat, page.maps, charts, state.normals, std::span(page.aux.pixels).subspan(2), 4);
+  addBeyond(seams, beyond, charts, state, page);
+  denoise(page.flat, page.maps, charts, state.normals, std::span(page.aux.pixels).subspan(kErrorChannel), 4);
+  for (const BeyondTexel& texel : beyond) page.aux.pixels[std::size_t{4} * texel.texel + kErrorChannel] = 0.0f;
+}
+
+std::vector<SeamPage> seamPagesOf(std::vector<BakedPage>& pages) {
+  std::vector<SeamPage> seamPages;
+  for (BakedPage& page : pages) {
+    SeamPage& to = seamPages.emplace_back();
+    to.flat = &page.flat;
+    to.maps = page.maps;
+    to.states.assign(page.aux.pixels.size() / 4, TexelState::Empty);
+    for (std::size_t i = 0; i < to.states.size(); ++i)
+      if (page.aux.pixels[i * 4] > 0.0f)
+        to.states[i] = page.aux.pixels[i * 4 + 1] < kLeastValidity ? TexelState::Hole : TexelState::Known;
+    to.errors = std::span(page.aux.pixels).subspan(std::min(kErrorChannel, page.aux.pixels.size()));
+    to.errorStride = 4;
+  }
+  return seamPages;
+}
+
+/// The entries of one page; they are sorted by page.
+std::span<const BeyondTexel> onPage(const std::vector<BeyondTexel>& beyond, std::size_t page) {
+  const auto [first, last] = std::ranges::equal_range(beyond, page, {}, &BeyondTexel::page);
+  return {first, last};
+}
+
+/// Calls map(image) for each map of a page, in parallel.
+template <class Map>
+void forEachMap(BakedPage& page, const Map& map) {
+  parallelFor(page.maps.size() + 1, 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) map(i < page.maps.size() ? page.maps[i] : page.flat);
+  });
+}
+
+void dilatePage(BakedPage& page, std::span<const BeyondTexel> beyond, int rings) {
+  TexelMask known{page.aux.width, page.aux.height, std::vector<std::uint8_t>(page.aux.pixels.size() / 4, 0)};
+  for (std::size_t i = 0; i < known.known.size(); ++i) known.known[i] = page.aux.pixels[i * 4] > 0.0f ? 1 : 0;
+  for (const BeyondTexel& texel : beyond) known.known[texel.texel] = 1;
+  forEachMap(page, [&](Image& map) {
+    TexelMask mask = known;
+    dilate(map, mask, rings);
+  });
 }
 
 }  // namespace
 
-void finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels,
-                 const FinishOptions& options) {
-  for (std::size_t p = 0; p < pages.size(); ++p) {
-    BakedPage& page = pages[p];
-    const PageState state = stateOf(page, atlas, texels[p], options.denoise);
-    if (options.denoise) denoisePage(page, state);
-    parallelFor(page.maps.size() + 1, 1, [&](std::size_t first, std::size_t last) {
-      for (std::size_t i = first; i < last; ++i) {
-        Image& map = i < page.maps.size() ? page.maps[i] : page.flat;
-        if (state.hasHoles) fillHoles(map, state.valid, state.chartIds, state.holes);
-        TexelMask known = state.covered;
-        if (options.rings > 0) dilate(map, known, options.rings);
-      }
-    });
+SeamFigures finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                        const FinishOptions& options) {
+  static const Seams kNoSeams;
+  const Seams& seams = options.seams != nullptr && options.rings > 0 ? *options.seams : kNoSeams;
+  std::vector<SeamPage> seamPages;
+  std::vector<BeyondTexel> beyond;
+  if (!seams.points.empty()) {
+    seamPages = seamPagesOf(pages);
+    beyond = texelsBeyond(seams, seamPages);
+    continueLight(seams, beyond, seamPages);
   }
+  for (std::size_t p = 0; p < pages.size(); ++p) {
+    PageState state = stateOf(pages[p], atlas, texels[p], options.denoise);
+    if (options.denoise) denoisePage(pages[p], state, seams, onPage(beyond, p));
+    if (state.hasHoles)
+      forEachMap(pages[p], [&](Image& map) { fillHoles(map, state.valid, state.chartIds, state.holes); });
+  }
+  SeamFigures figures;
+  if (!seams.points.empty()) figures = mendSeams(seams, beyond, seamPages);
+  if (options.rings > 0)
+    for (std::size_t p = 0; p < pages.size(); ++p) dilatePage(pages[p], onPage(beyond, p), options.rings);
+  return figures;
 }
 
 void cutToHalf(BakeResult& result) {

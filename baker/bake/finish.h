@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "baker/bake/bake.h"
+#include "lightmap/seams/seam_maps.h"
+#include "lightmap/seams/seams.h"
 #include "lightmap/surface.h"
 #include "lightmap/texels/texels.h"
 
@@ -12,17 +14,19 @@ namespace lumel {
 
 struct FinishOptions {
   bool denoise = false;
-  int rings = 0;  // of texels that maps grow by, beyond what is covered
+  int rings = 0;                 // of texels that maps grow by, beyond what is covered
+  const Seams* seams = nullptr;  // where lookups from both sides shall agree; of no effect without rings
 };
 
 /// First noise is taken out of the maps, if asked for (lightmap/denoise.h); invalid texels take no part.
 /// A covered texel whose rays mostly met the backs of surfaces (validity under one half: it lies inside a wall, under
 /// a pillar) takes the light of the nearest valid texels of its chart, where the chart has any; it would leak darkness
-/// into bilinear lookups beside it. Then every map grows by `rings`, so that a lookup at a chart's border does not mix
-/// in black. The aux images stay as they are: they still tell own values from others, and give the error before
-/// denoising.
-void finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels,
-                 const FinishOptions& options);
+/// into bilinear lookups beside it. At seams, the texels beyond a chart's border take the light of the other side
+/// before noise is taken out, and lookups from both sides are made to agree after. Then every map grows by `rings`, so
+/// that a lookup at a chart's border does not mix in black. The aux images stay as they are: they still tell own values
+/// from others, and give the error before denoising.
+SeamFigures finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                        const FinishOptions& options);
 
 /// The largest number that a half holds.
 inline constexpr float kMostHalf = 65504.0f;

@@ -88,6 +88,9 @@ void declareOptions(OptionTable& options, BakeArguments& a) {
   options.flag("half", a.half, "Write half floats: half the size, values up to 65504");
   options.choice("denoise", a.denoise, {"auto", "on", "off"},
                  "Average texels with those around them that agree within their noise; auto: with --integrator gather");
+  options.choice("seams", a.bake.seams, {"off", "on"},
+                 "Make lookups from both sides agree where charts or objects meet and light goes on; off with "
+                 "--dilate 0");
   options.integer("dilate", a.dilate, {0, 1024}, "Rings of texels grown around charts; 0: none").defaultText =
       "half of --padding";
   declareOutsidePaths(options, a);
@@ -163,6 +166,10 @@ void printSummary(const fs::path& output, const AtlasResult& atlas, const BakeRe
   else
     std::fputs("standard error not known", stderr);
   std::fprintf(stderr, ", projection residual %.2g%%\n", 100.0 * stats.projectionResidual);
+  if (stats.seams.points > 0)
+    std::fprintf(stderr, "steps at seams %.2g%% (%.2g%% before), at most %.2g%% (%.2g%%)\n",
+                 100.0 * stats.seams.after.rms, 100.0 * stats.seams.before.rms, 100.0 * stats.seams.after.most,
+                 100.0 * stats.seams.before.most);
   std::fprintf(stderr, "%.1f s, %.1f million rays (%.1f million per second of bake), %.0f MiB at the peak\n", seconds,
                rays / 1e6, stats.seconds > 0 ? rays / 1e6 / stats.seconds : 0.0,
                static_cast<double>(record.peakMemoryBytes) / (1024.0 * 1024.0));
@@ -254,7 +261,8 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   auto baked = bake(*scene, atlas->atlas, texels, record.bakeOptions, progress);
   if (!baked) return baked.error();
   clock.start("finish");
-  finishPages(baked->pages, atlas->atlas, texels, {.denoise = denoises(a), .rings = dilate});
+  baked->stats.seams = finishPages(baked->pages, atlas->atlas, texels,
+                                   {.denoise = denoises(a), .rings = dilate, .seams = &baked->seams});
   if (a.half) cutToHalf(*baked);
   clock.stop();
   if (progress.cancelled()) return interrupted();

@@ -138,7 +138,14 @@ Json describeError(const BakeStats& stats) {
   return {{"meanFlat", stats.meanFlat},
           {"meanStandardError", error},
           {"projectionResidual", stats.projectionResidual},
+          {"seams", describeSeams(stats.seams)},
           {"nonFiniteSamples", stats.nonFiniteSamples}};
+}
+
+Json describeSeams(const SeamFigures& seams) {
+  if (seams.points == 0) return nullptr;
+  const auto steps = [](const SeamSteps& s) { return Json{{"rms", s.rms}, {"max", s.most}}; };
+  return {{"texels", seams.texels}, {"stepsBefore", steps(seams.before)}, {"steps", steps(seams.after)}};
 }
 
 Json describeRun(const BakeStats& stats, const BakeRecord& record) {
