@@ -106,7 +106,8 @@ std::vector<SeamPage> seamPagesOf(std::vector<BakedPage>& pages) {
       if (page.aux.pixels[i * 4] > 0.0f)
         to.states[i] = page.aux.pixels[i * 4 + 1] < kLeastValidity ? TexelState::Hole : TexelState::Known;
     to.errors = std::span(page.aux.pixels).subspan(std::min(kErrorChannel, page.aux.pixels.size()));
-    to.errorStride = 4;
+    to.coverages = page.aux.pixels;
+    to.stride = 4;
   }
   return seamPages;
 }

@@ -14,15 +14,28 @@ namespace {
 
 /// Least error of a texel, as a share of its light: where noise is less, filtering errs by so much.
 constexpr double kLeastError = 0.003;
-/// By how much better sides agree than texels are known.
-constexpr double kTightness = 10.0;
-/// Error of what lookups on the other side say of a texel beyond, over that of the texels they read.
-constexpr double kAcross = 1.0;
+/// By how much better sides agree than texels are known; and their tolerance as a share of the step before: where
+/// texels are too coarse for the light, they are not bent to meet at any price.
+constexpr double kTightness = 30.0;
+constexpr double kLeftOfStep = 0.01;
+/// Error of what lookups on the other side say of a texel beyond: over that of the texels they read, and as a share of
+/// how far these differ.
+constexpr double kAcross = 3.0;
+constexpr double kAcrossSpread = 0.1;
 /// Error, as a share of the light around, of an empty texel of which nothing is known.
-constexpr double kUnknown = 0.5;
+constexpr double kUnknown = 0.2;
 /// Points do not count of which more lies on holes, or less on texels of their own chart.
 constexpr float kMostHoles = 0.01f;
 constexpr float kLeastKnown = 0.2f;
+/// Light whose sides differ by more than this factor has an edge there, or one side lies hidden: the crossing's ray has
+/// missed what stands on the seam.
+constexpr double kMostRatio = 3.0;
+
+/// A texel that would change by more than this factor is held by its value the more, in further rounds: where texels
+/// are too coarse for the light, lookups cannot meet.
+constexpr double kMostChange = 1.5;
+constexpr double kStiffening = 100.0;
+constexpr int kRounds = 3;
 
 constexpr std::uint32_t kNone = ~0u;
 
@@ -83,6 +96,7 @@ struct Unknown {
   std::uint32_t group = 0;  // the root of its tree first, then the group's number
   std::uint32_t local = 0;  // its number in the group
   double error = 0.0;       // of its value
+  double stiffness = 1.0;   // factor to the weight of its value
   bool isKnown = false;
   Frame frame;
   SeamLight light;  // before
@@ -98,6 +112,38 @@ std::array<Lookup, 2> lookupsAt(const Seams& seams, const SeamPoint& point, std:
   return both;
 }
 
+double flatAt(const SeamPage& page, std::uint32_t texel) {
+  const float* pixel = page.flat->pixels.data() + std::size_t{3} * texel;
+  return static_cast<double>(luminance(Vec3(pixel[0], pixel[1], pixel[2])));
+}
+
+/// How far a texel and the known ones beside it (four) differ at most.
+double spreadAround(const SeamPage& page, std::uint32_t texel) {
+  const auto width = static_cast<std::uint32_t>(page.flat->width);
+  const std::uint32_t x = texel % width;
+  double low = flatAt(page, texel), high = low;
+  const auto see = [&](std::uint32_t other) {
+    if (page.states[other] != TexelState::Known) return;
+    low = std::min(low, flatAt(page, other));
+    high = std::max(high, flatAt(page, other));
+  };
+  if (x > 0) see(texel - 1);
+  if (x + 1 < width) see(texel + 1);
+  if (texel >= width) see(texel - width);
+  if (texel + width < page.states.size()) see(texel + width);
+  return high - low;
+}
+
+struct Group {
+  std::vector<std::uint32_t> unknowns, points, beyond;
+};
+
+SeamLight moved(const Unknown& unknown, std::span<const double> moves) {
+  SeamLight light = unknown.light;
+  for (std::size_t c = 0; c < SeamLight::kValues; ++c) light.values[c] += moves[unknown.local * SeamLight::kValues + c];
+  return light;
+}
+
 class Mender {
  public:
   Mender(const Seams& seams, std::span<const BeyondTexel> beyond, std::span<SeamPage> pages)
@@ -110,6 +156,7 @@ class Mender {
   void readUnknowns();
   void joinGroups();
   void solve(std::uint32_t group);
+  bool stiffen(const Group& group, std::span<const double> moves);
   void addPoint(const SeamPoint& point, LeastSquares& system) const;
   void addBeyond(const BeyondTexel& texel, LeastSquares& system) const;
   void addOwn(const Unknown& unknown, LeastSquares& system) const;
@@ -138,9 +185,6 @@ class Mender {
   TexelNumbers numbers_;
   std::vector<SeamPoint> points_;  // those that count
   std::vector<Unknown> unknowns_;
-  struct Group {
-    std::vector<std::uint32_t> unknowns, points, beyond;
-  };
   std::vector<Group> groups_;
 };
 
@@ -149,11 +193,14 @@ void Mender::chooseUnknowns() {
     const SeamPair& pair = seams_.pairs[point.pair];
     const std::array<Lookup, 2> lookups = lookupsAt(seams_, point, pages_);
     bool counts = true;
+    std::array<double, 2> light{};
     for (std::size_t k = 0; k < 2; ++k) {
       const SeamPage& page = pages_[pair.sides[k].page];
       counts = counts && shareOf(lookups[k], page, TexelState::Hole) <= kMostHoles &&
                shareOf(lookups[k], page, TexelState::Known) >= kLeastKnown;
+      light[k] = readPart(page, lookups[k], pair.sides[k].frame, false).light.luminanceOfFlat();
     }
+    counts = counts && std::max(light[0], light[1]) <= kMostRatio * std::min(light[0], light[1]);
     if (!counts) continue;
     points_.push_back(point);
     for (std::size_t k = 0; k < 2; ++k)
@@ -207,9 +254,12 @@ void Mender::readUnknowns() {
       Unknown& unknown = unknowns_[i];
       const SeamPage& page = pages_[unknown.page];
       unknown.light = readLight(page, unknown.texel, unknown.frame);
-      const auto stated = static_cast<double>(page.errors[unknown.texel * page.errorStride]);
+      const auto stated = static_cast<double>(page.errors[unknown.texel * page.stride]);
       const double light = std::abs(unknown.light.luminanceOfFlat());
       unknown.error = std::max({kLeastError * light, unknown.isKnown && std::isfinite(stated) ? stated : 0.0, 1e-30});
+      // A partly covered texel holds the light of its covered part, up to half a texel off its middle.
+      const double uncovered = 1.0 - std::min(1.0, static_cast<double>(page.coverages[unknown.texel * page.stride]));
+      if (unknown.isKnown) unknown.error += 0.5 * uncovered * spreadAround(page, unknown.texel);
     }
   });
 }
@@ -269,7 +319,7 @@ void Mender::addPoint(const SeamPoint& point, LeastSquares& system) const {
   double error = 0.0;
   addTaps(pair.sides[0].page, lookups[0], 1.0, row, residual, error);
   addTaps(pair.sides[1].page, lookups[1], -1.0, row, residual, error);
-  const double scale = kTightness / (0.5 * error);
+  const double scale = 1.0 / (0.5 * error / kTightness + kLeftOfStep * std::abs(residual.luminanceOfFlat()));
   system.add(row, static_cast<double>(point.texels) * scale * scale, residual.values);
 }
 
@@ -287,8 +337,13 @@ void Mender::addBeyond(const BeyondTexel& texel, LeastSquares& system) const {
   const Unknown& own = unknowns_[numbers_.of(texel.page, texel.texel)];
   row.add(own.local, -1.0);
   residual.add(own.light, 1.0);
+  double low = own.light.luminanceOfFlat(), high = low;
+  for (const std::uint32_t tap : lookup.texels) {
+    low = std::min(low, flatAt(page, tap));
+    high = std::max(high, flatAt(page, tap));
+  }
   const auto known = static_cast<double>(shareOf(lookup, page, TexelState::Known));
-  const double scale = 1.0 / (kAcross * std::max(error, 1e-30));
+  const double scale = 1.0 / std::max(kAcross * error + kAcrossSpread * (high - low), 1e-30);
   system.add(row, std::max(known * known, 0.01) * scale * scale, residual.values);
 }
 
@@ -297,27 +352,41 @@ void Mender::addOwn(const Unknown& unknown, LeastSquares& system) const {
   row.add(unknown.local, 1.0);
   const double error =
       unknown.isKnown ? unknown.error : std::max(unknown.error, kUnknown * std::abs(unknown.light.luminanceOfFlat()));
-  system.add(row, 1.0 / (error * error), SeamLight{}.values);
+  system.add(row, unknown.stiffness / (error * error), SeamLight{}.values);
 }
 
 void Mender::solve(std::uint32_t group) {
-  Group& g = groups_[group];
-  LeastSquares system(g.unknowns.size(), SeamLight::kValues);
-  for (const std::uint32_t i : g.unknowns) addOwn(unknowns_[i], system);
-  for (const std::uint32_t i : g.beyond) addBeyond(beyond_[i], system);
-  for (const std::uint32_t i : g.points) addPoint(points_[i], system);
-  const std::vector<double> moves = system.solve();
-  if (moves.empty()) return;
+  const Group& g = groups_[group];
+  std::vector<double> moves;
+  for (int round = 0; round < kRounds; ++round) {
+    LeastSquares system(g.unknowns.size(), SeamLight::kValues);
+    for (const std::uint32_t i : g.unknowns) addOwn(unknowns_[i], system);
+    for (const std::uint32_t i : g.beyond) addBeyond(beyond_[i], system);
+    for (const std::uint32_t i : g.points) addPoint(points_[i], system);
+    moves = system.solve();
+    if (moves.empty()) return;
+    if (!stiffen(g, moves)) break;
+  }
   for (const std::uint32_t i : g.unknowns) {
     const Unknown& unknown = unknowns_[i];
-    SeamLight light = unknown.light;
-    bool finite = true;
-    for (std::size_t c = 0; c < SeamLight::kValues; ++c) {
-      light.values[c] += moves[unknown.local * SeamLight::kValues + c];
-      finite = finite && std::isfinite(light.values[c]);
-    }
-    if (finite) writeLight(light, unknown.frame, unknown.texel, pages_[unknown.page]);
+    const SeamLight light = moved(unknown, moves);
+    if (std::ranges::all_of(light.values, [](double value) { return std::isfinite(value); }))
+      writeLight(light, unknown.frame, unknown.texel, pages_[unknown.page]);
   }
+}
+
+/// Holds those texels by their values that would change by more than kMostChange. Returns whether there are any.
+bool Mender::stiffen(const Group& group, std::span<const double> moves) {
+  bool any = false;
+  for (const std::uint32_t i : group.unknowns) {
+    Unknown& unknown = unknowns_[i];
+    const double before = unknown.light.luminanceOfFlat();
+    const double after = moved(unknown, moves).luminanceOfFlat();
+    if (after <= kMostChange * before && before <= kMostChange * after) continue;
+    unknown.stiffness *= kStiffening;
+    any = true;
+  }
+  return any;
 }
 
 SeamSteps Mender::steps(bool mended) const {
@@ -333,14 +402,30 @@ SeamSteps Mender::steps(bool mended) const {
         const std::uint32_t texel = lookups[k].texels[tap];
         if (!mended && page.states[texel] != TexelState::Known) continue;
         const auto weight = static_cast<double>(lookups[k].weights[tap]);
-        const float* pixel = page.flat->pixels.data() + std::size_t{3} * texel;
-        read[k] += weight * static_cast<double>(luminance(Vec3(pixel[0], pixel[1], pixel[2])));
+        read[k] += weight * flatAt(page, texel);
         share += weight;
       }
       read[k] /= share;
     }
     if (!(read[0] + read[1] > 0.0)) continue;
     const double step = 2.0 * std::abs(read[0] - read[1]) / (read[0] + read[1]);
+    if (getenv("SEAMDUMP") && mended) {
+      fprintf(stderr, "DUMP %.4f %.5g %.5g len %.4f m pts %.3f", step, read[0], read[1],
+              seams_.pairs[point.pair].length, point.texels);
+      for (std::size_t k = 0; k < 2; ++k) {
+        const auto& sd = seams_.pairs[point.pair].sides[k];
+        auto pl = sd.at({point.metres, 0});
+        fprintf(stderr, " | c%u %.2f %.2f dens %.2f %.2f", sd.chart, pl.x, pl.y, glm::length(sd.along),
+                glm::length(sd.out));
+        for (std::size_t tap = 0; tap < 4; ++tap) {
+          auto t = lookups[k].texels[tap];
+          fprintf(stderr, " %d:%.2f:%.3g(%.3g)", int(pages_[sd.page].states[t]), lookups[k].weights[tap],
+                  pages_[sd.page].flat->pixels[3 * t + 1],
+                  numbers_.isMarked(sd.page, t) ? unknowns_[numbers_.of(sd.page, t)].light.values[1] : -1);
+        }
+      }
+      fprintf(stderr, "\n");
+    }
     squares += static_cast<double>(point.texels) * step * step;
     texels += static_cast<double>(point.texels);
     steps.most = std::max(steps.most, step);

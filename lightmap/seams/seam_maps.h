@@ -23,9 +23,10 @@ enum class TexelState : std::uint8_t {
 struct SeamPage {
   Image* flat = nullptr;
   std::array<Image*, 3> rnm{};
-  std::vector<TexelState> states;  // row by row
-  std::span<const float> errors;   // standard error of the flat map's luminance, `errorStride` floats apart
-  std::size_t errorStride = 1;
+  std::vector<TexelState> states;    // row by row
+  std::span<const float> errors;     // standard error of the flat map's luminance, `stride` floats apart
+  std::span<const float> coverages;  // share of the texel's area, as far apart
+  std::size_t stride = 1;
 };
 
 /// An empty texel that a lookup at a seam reads; what it should hold lies on the other side.

@@ -133,6 +133,12 @@ Json describeScene(const Scene& scene, const BakeRecord& record) {
           {"skippedPrimitives", scene.report.skippedPrimitives}};
 }
 
+Json describeSeams(const SeamFigures& seams) {
+  if (seams.points == 0) return nullptr;
+  const auto steps = [](const SeamSteps& s) { return Json{{"rms", s.rms}, {"max", s.most}}; };
+  return {{"texels", seams.texels}, {"stepsBefore", steps(seams.before)}, {"steps", steps(seams.after)}};
+}
+
 Json describeError(const BakeStats& stats) {
   const Json error = stats.meanStandardError ? Json(*stats.meanStandardError) : Json(nullptr);
   return {{"meanFlat", stats.meanFlat},
@@ -140,12 +146,6 @@ Json describeError(const BakeStats& stats) {
           {"projectionResidual", stats.projectionResidual},
           {"seams", describeSeams(stats.seams)},
           {"nonFiniteSamples", stats.nonFiniteSamples}};
-}
-
-Json describeSeams(const SeamFigures& seams) {
-  if (seams.points == 0) return nullptr;
-  const auto steps = [](const SeamSteps& s) { return Json{{"rms", s.rms}, {"max", s.most}}; };
-  return {{"texels", seams.texels}, {"stepsBefore", steps(seams.before)}, {"steps", steps(seams.after)}};
 }
 
 Json describeRun(const BakeStats& stats, const BakeRecord& record) {
