@@ -144,7 +144,8 @@ SeamFigures finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const
   const Seams& seams = options.seams != nullptr && options.rings > 0 ? *options.seams : kNoSeams;
   std::vector<SeamPage> seamPages;
   std::vector<BeyondTexel> beyond;
-  if (!seams.points.empty()) {
+  const bool mends = !seams.points.empty() && canMend(pages.front().maps.size());
+  if (mends) {
     seamPages = seamPagesOf(pages);
     beyond = texelsBeyond(seams, seamPages);
     continueLight(seams, beyond, seamPages);
@@ -156,7 +157,7 @@ SeamFigures finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const
       forEachMap(pages[p], [&](Image& map) { fillHoles(map, state.valid, state.chartIds, state.holes); });
   }
   SeamFigures figures;
-  if (!seams.points.empty()) figures = mendSeams(seams, beyond, seamPages);
+  if (mends) figures = mendSeams(seams, beyond, seamPages);
   if (options.rings > 0)
     for (std::size_t p = 0; p < pages.size(); ++p) dilatePage(pages[p], onPage(beyond, p), options.rings);
   return figures;

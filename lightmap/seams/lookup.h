@@ -46,8 +46,9 @@ inline float shareOf(const Lookup& lookup, const SeamPage& page, TexelState stat
   return share;
 }
 
-/// What is kept of a texel while seams are mended: all maps such that neighbours across a seam are alike. Per colour:
-/// the flat map, the mean of the RNM maps, and the part of sum map_i B_i along the surface, in world space.
+/// What is kept of a texel while seams are mended: all maps such that neighbours across a seam are alike. Per colour: the
+/// flat map; what the maps decode to on the surface's own normal but for a vector; and that vector in world space. One
+/// map: itself, and no vector. RNM: the mean, and sum map_i B_i along the surface. SH L1: L0 and L.
 struct SeamLight {
   static constexpr std::size_t kValues = 15;
   std::array<double, kValues> values{};
@@ -59,7 +60,7 @@ struct SeamLight {
 };
 
 SeamLight readLight(const SeamPage& page, std::uint32_t texel, const Frame& frame);
-/// Values below zero become zero; the mean of the RNM maps stays.
+/// Values below zero become zero, and the mean of RNM maps stays; the vector of SH L1 may point where it will.
 void writeLight(const SeamLight& light, const Frame& frame, std::uint32_t texel, SeamPage& page);
 
 /// What a lookup reads of known texels, of texels beyond as well if asked for, as if there were no others; and how much

@@ -9,22 +9,59 @@
 
 namespace lumel {
 
+namespace {
+
+/// One colour of a texel's maps as a scalar and a vector in the bake frame.
+struct Directional {
+  double scalar = 0.0;
+  Vec3 vector{0};
+};
+
+Directional fromMaps(std::span<const float> maps) {
+  if (maps.size() == 1) return {static_cast<double>(maps[0]), Vec3(0)};
+  if (maps.size() == 4) return {static_cast<double>(maps[0]), Vec3(maps[1], maps[2], maps[3])};
+  Directional light;
+  for (std::size_t i = 0; i < 3; ++i) {
+    light.scalar += static_cast<double>(maps[i]) / 3.0;
+    light.vector += maps[i] * Vec3(kRnmBasis[i].x, kRnmBasis[i].y, 0.0f);
+  }
+  return light;
+}
+
+void toMaps(const Directional& light, std::span<float> maps) {
+  const double scalar = std::max(light.scalar, 0.0);
+  maps[0] = static_cast<float>(scalar);
+  if (maps.size() == 4)
+    for (int axis = 0; axis < 3; ++axis) maps[static_cast<std::size_t>(axis) + 1] = light.vector[axis];
+  if (maps.size() != 3) return;
+  std::array<double, 3> values{};
+  double sum = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    // The basis is orthonormal, and the mean is the part along the normal over sqrt(3).
+    const float along = light.vector.x * kRnmBasis[i].x + light.vector.y * kRnmBasis[i].y;
+    values[i] = std::max(scalar + static_cast<double>(along), 0.0);
+    sum += values[i];
+  }
+  for (std::size_t i = 0; i < 3; ++i)
+    maps[i] = static_cast<float>(sum > 0.0 ? values[i] * (3.0 * scalar / sum) : scalar);
+}
+
+constexpr std::size_t kMostMendable = 4;
+
+}  // namespace
+
 SeamLight readLight(const SeamPage& page, std::uint32_t texel, const Frame& frame) {
   SeamLight light;
   const std::size_t pixel = std::size_t{3} * texel;
   for (std::size_t c = 0; c < 3; ++c) {
     light.values[c] = static_cast<double>(page.flat->pixels[pixel + c]);
-    Vec3 sum(0);
-    float mean = 0.0f;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const float value = page.rnm[i]->pixels[pixel + c];
-      mean += value / 3.0f;
-      sum += value * kRnmBasis[i];
-    }
-    const Vec3 along = sum.x * frame.t + sum.y * frame.b;
-    light.values[3 + c] = static_cast<double>(mean);
+    std::array<float, kMostMendable> maps{};
+    for (std::size_t i = 0; i < page.maps.size(); ++i) maps[i] = page.maps[i].pixels[pixel + c];
+    const Directional directional = fromMaps(std::span(maps).first(page.maps.size()));
+    const Vec3 world = frame.fromLocal(directional.vector);
+    light.values[3 + c] = directional.scalar;
     for (int axis = 0; axis < 3; ++axis)
-      light.values[6 + 3 * c + static_cast<std::size_t>(axis)] = static_cast<double>(along[axis]);
+      light.values[6 + 3 * c + static_cast<std::size_t>(axis)] = static_cast<double>(world[axis]);
   }
   return light;
 }
@@ -33,18 +70,10 @@ void writeLight(const SeamLight& light, const Frame& frame, std::uint32_t texel,
   const std::size_t pixel = std::size_t{3} * texel;
   for (std::size_t c = 0; c < 3; ++c) {
     page.flat->pixels[pixel + c] = static_cast<float>(std::max(light.values[c], 0.0));
-    const double mean = std::max(light.values[3 + c], 0.0);
-    const Vec3 along(light.values[6 + 3 * c], light.values[7 + 3 * c], light.values[8 + 3 * c]);
-    const float x = glm::dot(along, frame.t), y = glm::dot(along, frame.b);
-    std::array<double, 3> maps{};
-    double sum = 0.0;
-    for (std::size_t i = 0; i < 3; ++i) {
-      // The basis is orthonormal, and the mean is the part along the normal over sqrt(3).
-      maps[i] = std::max(mean + static_cast<double>(x * kRnmBasis[i].x + y * kRnmBasis[i].y), 0.0);
-      sum += maps[i];
-    }
-    for (std::size_t i = 0; i < 3; ++i)
-      page.rnm[i]->pixels[pixel + c] = static_cast<float>(sum > 0.0 ? maps[i] * (3.0 * mean / sum) : mean);
+    const Vec3 world(light.values[6 + 3 * c], light.values[7 + 3 * c], light.values[8 + 3 * c]);
+    std::array<float, kMostMendable> maps{};
+    toMaps({light.values[3 + c], frame.toLocal(world)}, std::span(maps).first(page.maps.size()));
+    for (std::size_t i = 0; i < page.maps.size(); ++i) page.maps[i].pixels[pixel + c] = maps[i];
   }
 }
 
