@@ -46,9 +46,9 @@ inline float shareOf(const Lookup& lookup, const SeamPage& page, TexelState stat
   return share;
 }
 
-/// What is kept of a texel while seams are mended: all maps such that neighbours across a seam are alike. Per colour: the
-/// flat map; what the maps decode to on the surface's own normal but for a vector; and that vector in world space. One
-/// map: itself, and no vector. RNM: the mean, and sum map_i B_i along the surface. SH L1: L0 and L.
+/// What is kept of a texel while seams are mended: all maps such that neighbours across a seam are alike. Per colour:
+/// the flat map; what the maps decode to on the surface's own normal but for a vector; and that vector in world space.
+/// One map: itself, and no vector. RNM: the mean, and sum map_i B_i along the surface. SH L1: L0 and L.
 struct SeamLight {
   static constexpr std::size_t kValues = 15;
   std::array<double, kValues> values{};

@@ -15,8 +15,9 @@ namespace {
 /// Least error of a texel, as a share of its light: where noise is less, filtering errs by so much.
 constexpr double kLeastError = 0.003;
 /// How far off its middle, in texels, a partly covered texel holds the light, times its uncovered share. Half a texel
-/// at most; with 0.2 lookups at slanted borders came nearest to those in one piece, with 0.5 noise was taken for light.
-constexpr double kOffMiddle = 0.2;
+/// at most; with 0 to 0.2 lookups at slanted borders come nearest to
+/// those in one piece.
+constexpr double kOffMiddle = 0.1;
 /// By how much better sides agree than texels are known; and their tolerance as a share of the step before: where
 /// texels are too coarse for the light, they are not bent to meet at any price.
 constexpr double kTightness = 30.0;
@@ -27,16 +28,17 @@ constexpr double kAcross = 3.0;
 constexpr double kAcrossSpread = 0.1;
 /// Error, as a share of the light around, of an empty texel of which nothing is known.
 constexpr double kUnknown = 0.2;
-/// Points do not count of which more lies on holes, or less on texels of their own chart.
+/// Points do not count of which more lies on holes, or less on what texels cover: thinner slivers hold the light of a
+/// sliver, and bending them to meet at their borders would change all of it.
 constexpr float kMostHoles = 0.01f;
-constexpr float kLeastKnown = 0.2f;
+constexpr float kLeastCovered = 0.2f;
 /// Light whose sides differ by more than this factor has an edge there, or one side lies hidden: the crossing's ray has
 /// missed what stands on the seam.
 constexpr double kMostRatio = 3.0;
 
 /// A texel that would change by more than this factor is held by its value the more, in further rounds: where texels
 /// are too coarse for the light, lookups cannot meet.
-constexpr double kMostChange = 3.0;
+constexpr double kMostChange = 2.0;
 constexpr double kStiffening = 100.0;
 constexpr int kRounds = 3;
 
@@ -113,6 +115,15 @@ std::array<Lookup, 2> lookupsAt(const Seams& seams, const SeamPoint& point, std:
     both[k] = lookupAt(side.at({static_cast<double>(point.metres), 0.0}), pages[side.page]);
   }
   return both;
+}
+
+/// The share of a lookup that falls on covered parts of known texels.
+float coveredShare(const Lookup& lookup, const SeamPage& page) {
+  float share = 0.0f;
+  for (std::size_t k = 0; k < 4; ++k)
+    if (page.states[lookup.texels[k]] == TexelState::Known)
+      share += lookup.weights[k] * std::min(page.coverages[lookup.texels[k] * page.stride], 1.0f);
+  return share;
 }
 
 double flatAt(const SeamPage& page, std::uint32_t texel) {
@@ -200,7 +211,7 @@ void Mender::chooseUnknowns() {
     for (std::size_t k = 0; k < 2; ++k) {
       const SeamPage& page = pages_[pair.sides[k].page];
       counts = counts && shareOf(lookups[k], page, TexelState::Hole) <= kMostHoles &&
-               shareOf(lookups[k], page, TexelState::Known) >= kLeastKnown;
+               coveredShare(lookups[k], page) >= kLeastCovered;
       light[k] = readPart(page, lookups[k], pair.sides[k].frame, false).light.luminanceOfFlat();
     }
     counts = counts && std::max(light[0], light[1]) <= kMostRatio * std::min(light[0], light[1]);

@@ -19,13 +19,14 @@ enum class TexelState : std::uint8_t {
   Beyond,  // empty before, now with the light that continues across a seam
 };
 
-/// Whether seams in the maps of such an encoding can be mended: of those with one map (flat), three (RNM) or four (SH L1).
+/// Whether seams in the maps of such an encoding can be mended: of those with one map (flat), three (RNM) or four (SH
+/// L1).
 inline bool canMend(std::size_t mapCount) { return mapCount == 1 || mapCount == 3 || mapCount == 4; }
 
 /// A page of the maps. All images have its size and RGB.
 struct SeamPage {
   Image* flat = nullptr;
-  std::span<Image> maps;  // of an encoding that canMend
+  std::span<Image> maps;             // of an encoding that canMend
   std::vector<TexelState> states;    // row by row
   std::span<const float> errors;     // standard error of the flat map's luminance, `stride` floats apart
   std::span<const float> coverages;  // share of the texel's area, as far apart

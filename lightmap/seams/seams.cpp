@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "lightmap/seams/border_edges.h"
-#include "scene/base/parallel.h"
 
 namespace lumel {
 namespace {
@@ -23,7 +22,7 @@ constexpr double kPointsPerTexel = 2.0;
 constexpr double kReach = 0.5;
 constexpr double kLift = 0.1;
 
-/// What lies at both edges' common part.
+/// The common part of two edges.
 struct Meeting {
   double from = 0.0;  // metres from the first edge's start
   double to = 0.0;
