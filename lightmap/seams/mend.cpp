@@ -17,7 +17,7 @@ constexpr double kLeastError = 0.003;
 /// How far off its middle, in texels, a partly covered texel holds the light, times its uncovered share. Half a texel
 /// at most; with 0 to 0.2 lookups at slanted borders come nearest to
 /// those in one piece.
-constexpr double kOffMiddle = 0.1;
+constexpr double kOffMiddle = 0.2;
 /// By how much better sides agree than texels are known; and their tolerance as a share of the step before: where
 /// texels are too coarse for the light, they are not bent to meet at any price.
 constexpr double kTightness = 30.0;
