@@ -51,6 +51,7 @@ struct GatherScene {
   bool indirectOnly = false;
   std::optional<TraceMode> gatherMode{};       // of the texels' rays; else as CoherencePilot says
   std::vector<LightStrategy> strategies{};     // of the texels' own light
+  std::span<const std::uint8_t> divided{};     // GatherState::divided, once it is known
   std::span<const PackedColor> reflectance{};  // of the map's texels, once the warm-up has found it
 
   /// Levels of the cache, as the length of a row.

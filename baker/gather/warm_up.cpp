@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
@@ -126,6 +127,18 @@ void Sweeping::run() {
 
 }  // namespace
 
+Expected<void> findDivided(const GatherScene& scene, GatherState& state, Progress& progress) {
+  return forEachWave(0, scene.waves.size(), state, progress, [&](std::size_t w, GatheredWave&) {
+    const Wave& wave = scene.waves[w];
+    const TexelParts parts(scene.transport.rays, scene.transport.materials, scene.atlas, scene.texels[wave.page]);
+    std::array<std::uint32_t, kLanes> texels;
+    std::iota(texels.begin(), texels.end(), wave.first);
+    forEachLane(parts.suspects(std::span(texels).first(wave.count)), [&](std::size_t lane) {
+      state.divided[wave.start + lane] = parts.find(wave.first + lane) ? 1 : 0;
+    });
+  });
+}
+
 Expected<void> warmUp(const GatherScene& scene, GatherState& state, Progress& progress) {
   const std::size_t count = scene.map.size();
   WarmLinks links(count, scene.waves.size());
@@ -146,7 +159,7 @@ Expected<void> warmUp(const GatherScene& scene, GatherState& state, Progress& pr
       constant[t] = first[t] + warm[i].relit;
       state.warmBacks[t] = static_cast<std::uint8_t>(warm[i].backs);
       state.backFaces[t] = static_cast<std::uint32_t>(std::popcount(warm[i].backs));
-      state.uneven[t] = warm[i].isUneven() ? 1 : 0;
+      state.uneven[t] = warm[i].isUneven() || state.divided[t] != 0 ? 1 : 0;
       if (!scene.indirectOnly) continue;
       state.direct[t] = warm[i].direct;
       state.seen[t] = warm[i].seen * static_cast<float>(kWarmRays);

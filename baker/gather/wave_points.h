@@ -4,11 +4,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "baker/light/direct_light.h"
 #include "baker/rays/lanes.h"
+#include "baker/rays/texel_parts.h"
 #include "lightmap/texels/texels.h"
 #include "scene/base/sobol.h"
 
@@ -47,6 +49,9 @@ class WavePoints {
   void boundsOf(std::size_t lane, Vec3& least, Vec3& most) const;
   /// From the next draw on the lane is without a texel.
   void leaveOut(std::size_t lane);
+
+  /// From the next draw on the lane's points lie on one part of its texel. Keeps a reference to `parts`.
+  void keepTo(std::size_t lane, const TexelPart& part, const TexelParts& parts);
 
   /// Draws samples [first, first + count) of a pattern, count <= kMost a power of two: point i of every texel is its
   /// sample first + i, uniform over the texel's covered area.
@@ -96,6 +101,11 @@ class WavePoints {
     float n[3][kMost];
     float ng[3][kMost];
   };
+  /// The part of a divided texel that its points lie on.
+  struct KeptPart {
+    TexelPart part;
+    const TexelParts* parts = nullptr;
+  };
   struct SurfaceLanes {
     FrameLanes frame;
     Vec3Lanes ng;
@@ -108,6 +118,8 @@ class WavePoints {
                              Places& places);
   static void choose(std::span<const Piece> pieces, float area, std::uint32_t seed,
                      const std::uint32_t* reversedIndices, Places& places);
+  void chooseOn(const KeptPart& kept, std::span<const Piece> pieces, float area, std::uint32_t seed,
+                const std::uint32_t* reversedIndices, Places& places) const;
   static bool locate(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
   static void turnToLanes(const Drawn* drawn, bool turning, Vec3Lanes* p, Vec3Lanes* rayStarts, SurfaceLanes* surfaces);
   static void locateFrames(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
@@ -119,6 +131,7 @@ class WavePoints {
   std::vector<Piece> pieces_;                            // lane by lane
   std::array<std::uint32_t, kLanes + 1> firstSource_{};  // of each lane
   std::array<std::uint32_t, kLanes + 1> firstPiece_{};
+  std::array<std::optional<KeptPart>, kLanes> kept_;
   std::array<bool, kLanes> turns_{};  // the frame is not the same all over the texel
   bool turning_ = false;              // any does
   std::uint32_t mask_ = 0;

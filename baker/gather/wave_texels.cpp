@@ -7,6 +7,7 @@ WaveTexels::WaveTexels(const GatherScene& ofScene, std::uint32_t ofPage, std::si
       page(ofPage),
       first(firstTexel),
       count(texelCount),
+      parts(scene.transport.rays, scene.transport.materials, scene.atlas, scene.texels[page]),
       points(scene.transport.rays, scene.atlas, scene.texels[page], first, count) {
   for (std::size_t lane = 0; lane < count; ++lane) {
     const TexelCoord at = scene.texels[page].coords[first + lane];
@@ -14,6 +15,11 @@ WaveTexels::WaveTexels(const GatherScene& ofScene, std::uint32_t ofPage, std::si
     covered[lane] = points.covered(lane);
     lightSamples.setTexel(static_cast<int>(lane), samplers[lane]);
   }
+  if (scene.divided.empty()) return;
+  const std::size_t start = scene.map.firstOfPage(page) + first;
+  for (std::size_t lane = 0; lane < count; ++lane)
+    if (scene.divided[start + lane] != 0 && covered[lane])
+      if (const std::optional<TexelPart> part = parts.find(first + lane)) points.keepTo(lane, *part, parts);
 }
 
 Flight WaveTexels::flightOf(std::size_t lane, std::uint32_t sample, const PointLanes& from,

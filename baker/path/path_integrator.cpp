@@ -8,6 +8,7 @@
 #include "baker/rays/non_finite.h"
 #include "baker/rays/sampling.h"
 #include "baker/rays/stratified_net.h"
+#include "baker/rays/texel_parts.h"
 
 namespace lumel {
 namespace {
@@ -75,6 +76,7 @@ class WaveTracer {
   void launch(int lane, const Receiver& receiver, const Vec3& dirWorld, float pdf);
   void addLight(int lane, const Vec3& dirTangent, const Vec3& radianceOverPdf);
   void finishSample();
+  SurfacePoint pointOf(std::size_t lane, Vec2 u) const;
   /// Tells whether there are lights to choose among by what they were seen to bring. Else all samples are one stretch.
   bool learns() const { return punctual_[0].learnt.isUseful(); }
   PunctualChoice* choiceAt(bool texel) { return learns() ? &punctual_[texel ? 0 : 1] : nullptr; }
@@ -93,6 +95,8 @@ class WaveTracer {
   std::array<std::vector<NearLight>, kLanes> near_;
   alignas(64) std::array<float, kLanes> perReach2_{};
   bool anyNear_ = false;
+  std::optional<TexelParts> texelParts_;
+  std::array<std::optional<TexelPart>, kLanes> parts_;  // of divided texels: what their points lie on
   LightLanes lanes_;  // receivers of the light that is sampled next
   std::array<Path, kLanes> paths_;
   std::array<TexelSampler, kLanes> samplers_;
@@ -141,6 +145,24 @@ void WaveTracer::startTexels(std::uint32_t pageIndex, const PageTexels& page, st
     samplers_[lane] = TexelSampler(options_.seed, pageIndex, coords_[lane].x, coords_[lane].y);
     samples_.setTexel(static_cast<int>(lane), samplers_[lane]);
   }
+  texelParts_.emplace(transport_.rays, transport_.materials, atlas_, page);
+  forEachLane(texelParts_->suspects(first, count),
+              [&](std::size_t lane) { parts_[lane] = texelParts_->find(first + lane); });
+}
+
+/// A point of the texel; of a divided texel one on the part that counts, found by rejection.
+SurfacePoint WaveTracer::pointOf(std::size_t lane, Vec2 u) const {
+  constexpr int kMostTries = 256;
+  SurfacePoint point = footprints_[lane].sample(u);
+  if (!parts_[lane]) return point;
+  for (int i = 1; i < kMostTries; ++i) {
+    const SurfaceSpot spot{point.position, point.geometricNormal};
+    if (texelParts_->members(*parts_[lane], {&spot, 1}) != 0) break;
+    // The additive recurrence of the plastic number covers the square evenly, wherever it starts.
+    const Vec2d next = Vec2d(u) + static_cast<double>(i) * Vec2d(0.7548776662466927, 0.5698402909980532);
+    point = footprints_[lane].sample(Vec2(next - glm::floor(next)));
+  }
+  return point;
 }
 
 /// Takes samples that only teach which lights arrive, and that are not part of the result.
@@ -175,7 +197,7 @@ void WaveTracer::startSample() {
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     lanes_.active[lane] = covered_[lane];
     if (!covered_[lane]) continue;
-    const SurfacePoint point = footprints_[lane].sample(footprint[static_cast<int>(lane)]);
+    const SurfacePoint point = pointOf(lane, footprint[static_cast<int>(lane)]);
     Path& path = paths_[lane];
     path = Path{};
     path.frame = point.frame;

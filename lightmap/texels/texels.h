@@ -93,13 +93,15 @@ class TexelFootprint {
   /// point for single-ray work and for reports.
   SurfacePoint centroid() const;
 
+  /// The point of a piece with these weights of vertices 1 and 2.
+  SurfacePoint pointOn(const Piece& piece, Vec2 barycentric) const;
+
   /// What sample() chooses from, for callers that draw many points.
   std::span<const Source> sources() const { return sources_; }
   std::span<const Piece> pieces() const { return pieces_; }
 
  private:
   Source sourceOf(const TriangleRef& ref) const;
-  SurfacePoint pointOn(const Piece& piece, Vec2 barycentric) const;
 
   const Atlas* atlas_ = nullptr;
   int width_ = 0;  // of the page

@@ -1,0 +1,251 @@
+#include "baker/rays/texel_parts.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+
+#include "baker/rays/sampling.h"
+#include "scene/base/union_find.h"
+
+namespace lumel {
+namespace {
+
+/// Points look at each other from so many texel widths above the surface.
+constexpr float kLiftTexels = 0.05f;
+/// Corners are drawn in by this share of their way to the middle, so that what stands exactly along a texel's border
+/// does not divide it. What is left out is half a per cent of the texel.
+constexpr float kDrawnIn = 1.0f / 256.0f;
+/// Points that are drawn of a texel that may be divided, beside its corners.
+constexpr std::uint32_t kDrawn = 16;
+constexpr std::size_t kMostCorners = 16;
+/// Rays that tell whether a point lies inside of something.
+constexpr int kInsideRays = kLanes;
+
+/// Collects questions of who sees whom and traces them sixteen at a time. A question is answered with no as soon as one
+/// of its rays is blocked.
+class SightTest {
+ public:
+  SightTest(const RayScene& rays, const Materials& materials, std::size_t questions)
+      : rays_(rays), materials_(materials), seen_(questions, 1) {}
+
+  /// Over a bend that points outwards the way leads by a point above it.
+  void ask(std::size_t question, const SurfaceSpot& a, const SurfaceSpot& b, float lift) {
+    const Vec3 from = a.p + lift * a.ng, to = b.p + lift * b.ng;
+    const float cosine = glm::dot(a.ng, b.ng);
+    if (cosine > 0.9999f) return trace(question, from, to);
+    const Vec3 sum = a.ng + b.ng;
+    const float length = glm::length(sum);
+    if (!(length > 0.1f)) return trace(question, from, to);
+    const float rise = 0.5f * glm::length(b.p - a.p) * std::sqrt(std::max(0.0f, 1.0f - cosine) / (1.0f + cosine));
+    const Vec3 over = 0.5f * (a.p + b.p) + sum * ((lift + rise) / length);
+    trace(question, from, over);
+    trace(question, over, to);
+  }
+
+  /// Whether the two of each question see each other.
+  const std::vector<std::uint8_t>& answers() {
+    flush();
+    return seen_;
+  }
+
+ private:
+  void trace(std::size_t question, const Vec3& from, const Vec3& to) {
+    const Vec3 way = to - from;
+    if (!(glm::dot(way, way) > 0.0f) || seen_[question] == 0) return;
+    packet_.set(lanes_, from, way);
+    packet_.rayhit.ray.tfar[lanes_] = 1.0f;
+    questions_[static_cast<std::size_t>(lanes_)] = question;
+    if (++lanes_ == kLanes) flush();
+  }
+
+  void flush() {
+    if (lanes_ == 0) return;
+    rays_.intersect(packet_, TraceMode::Packet);
+    for (int lane = 0; lane < lanes_; ++lane)
+      if (packet_.hit(lane) && blocks(lane)) seen_[questions_[static_cast<std::size_t>(lane)]] = 0;
+    packet_.clear();
+    lanes_ = 0;
+  }
+
+  bool blocks(int lane) const {
+    const ScenePart& part = rays_.parts()[rays_.partOf(packet_, lane)];
+    return materials_.material(part.primitive->material).alphaMode == AlphaMode::Opaque;
+  }
+
+  const RayScene& rays_;
+  const Materials& materials_;
+  RayPacket packet_;
+  int lanes_ = 0;
+  std::array<std::size_t, kLanes> questions_{};
+  std::vector<std::uint8_t> seen_;
+};
+
+SurfaceSpot spotOf(const SurfacePoint& point) { return {point.position, point.geometricNormal}; }
+
+/// Height above the surface at which a texel's points look at each other, in metres: by the width of the texel on its
+/// first triangle, and more than rounding.
+float liftOf(const TexelFootprint& footprint, const Atlas& atlas, const RayScene& rays) {
+  const TexelFootprint::Source& source = footprint.sources().front();
+  const Surface& surface = atlas.surfaces[source.triangle.surface];
+  std::array<Vec3, 3> corners;
+  for (std::size_t i = 0; i < 3; ++i) corners[i] = surface.positions[source.vertices[i]];
+  const Vec2d a = source.texels[1] - source.texels[0], b = source.texels[2] - source.texels[0];
+  const double texels = std::abs(a.x * b.y - a.y * b.x);
+  const double meters2 =
+      glm::length(glm::cross(Vec3d(corners[1]) - Vec3d(corners[0]), Vec3d(corners[2]) - Vec3d(corners[0])));
+  const float width = texels > 0.0 ? static_cast<float>(std::sqrt(meters2 / texels)) : 0.0f;
+  return std::max(kLiftTexels * width, 16.0f * offsetDistance(corners, rays.translationOf(surface.instance)));
+}
+
+/// The corners of a footprint's pieces, drawn in towards its middle; of many a few.
+std::vector<SurfaceSpot> cornersOf(const TexelFootprint& footprint, const SurfaceSpot& middle) {
+  std::vector<SurfaceSpot> corners;
+  const std::span<const TexelFootprint::Piece> pieces = footprint.pieces();
+  for (const TexelFootprint::Piece& piece : pieces) {
+    for (const Vec2& c : piece.barycentric) corners.push_back(spotOf(footprint.pointOn(piece, c)));
+    if (piece.isSquare)  // the fourth corner lies opposite of the first
+      corners.push_back(
+          spotOf(footprint.pointOn(piece, piece.barycentric[1] + piece.barycentric[2] - piece.barycentric[0])));
+  }
+  if (corners.size() > kMostCorners) {
+    for (std::size_t i = 0; i < kMostCorners; ++i) corners[i] = corners[i * corners.size() / kMostCorners];
+    corners.resize(kMostCorners);
+  }
+  for (SurfaceSpot& corner : corners) corner.p += kDrawnIn * (middle.p - corner.p);
+  return corners;
+}
+
+/// Points spread evenly over the footprint (the additive recurrence of the plastic number, Roberts 2018).
+void addDrawn(const TexelFootprint& footprint, std::vector<SurfaceSpot>& spots) {
+  for (std::uint32_t i = 0; i < kDrawn; ++i) {
+    const Vec2d u = Vec2d(0.5) + static_cast<double>(i) * Vec2d(0.7548776662466927, 0.5698402909980532);
+    spots.push_back(spotOf(footprint.sample(Vec2(u - glm::floor(u)))));
+  }
+}
+
+}  // namespace
+
+std::uint32_t TexelParts::suspects(std::size_t first, std::size_t count) const {
+  SightTest sight(rays_, materials_, count);
+  TexelFootprint footprint;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!(footprint.clip(atlas_, page_, first + i) > 0.0)) continue;
+    const SurfaceSpot middle = spotOf(footprint.centroid());
+    const float lift = liftOf(footprint, atlas_, rays_);
+    for (const SurfaceSpot& corner : cornersOf(footprint, middle)) sight.ask(i, middle, corner, lift);
+  }
+  std::uint32_t suspected = 0;
+  const std::vector<std::uint8_t>& seen = sight.answers();
+  for (std::size_t i = 0; i < count; ++i) suspected |= seen[i] == 0 ? 1u << i : 0u;
+  return suspected;
+}
+
+std::optional<TexelPart> TexelParts::find(std::size_t texel) const {
+  TexelFootprint footprint;
+  if (!(footprint.clip(atlas_, page_, texel) > 0.0)) return std::nullopt;
+  const SurfaceSpot middle = spotOf(footprint.centroid());
+  const float lift = liftOf(footprint, atlas_, rays_);
+  std::vector<SurfaceSpot> spots = cornersOf(footprint, middle);
+  const std::size_t corners = spots.size();
+  addDrawn(footprint, spots);
+
+  // Points that see each other, by way of others too, are one part.
+  const std::size_t count = spots.size();
+  SightTest sight(rays_, materials_, count * count);
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t k = i + 1; k < count; ++k) sight.ask(i * count + k, spots[i], spots[k], lift);
+  const std::vector<std::uint8_t>& seen = sight.answers();
+  std::vector<std::uint32_t> parent(count);
+  std::iota(parent.begin(), parent.end(), 0u);
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t k = i + 1; k < count; ++k)
+      if (seen[i * count + k] != 0) unite(parent, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(k));
+  for (std::uint32_t i = 0; i < count; ++i) parent[i] = findRoot(parent, i);
+  if (std::ranges::count(parent, 0u) == static_cast<std::ptrdiff_t>(count)) return std::nullopt;
+
+  const std::vector<SurfaceSpot> neighbours = neighboursOf(texel);
+  std::optional<TexelPart> best;
+  double bestScore = 0.0;
+  for (std::size_t root = 0; root < count; ++root) {
+    if (parent[root] != root) continue;
+    TexelPart part;
+    part.lift = lift;
+    double score = 0.0;
+    // Drawn points first: they lie amid their part, corners at its rim.
+    for (std::size_t i = count; i-- > 0;) {
+      if (parent[i] != root) continue;
+      if (part.count < TexelPart::kMostSpots) part.spots[part.count++] = spots[i];
+      score += i >= corners ? 1.0 / kDrawn : 0.0;
+    }
+    for (std::size_t first = 0; first < neighbours.size(); first += kLanes)
+      score += std::popcount(members(
+          part, std::span(neighbours).subspan(first, std::min<std::size_t>(kLanes, neighbours.size() - first))));
+    if (isInside(part.spots[0], lift)) score -= 100.0;
+    if (best && score <= bestScore) continue;
+    best = part;
+    bestScore = score;
+  }
+  return best;
+}
+
+std::uint32_t TexelParts::members(const TexelPart& part, std::span<const SurfaceSpot> spots) const {
+  SightTest sight(rays_, materials_, spots.size() * part.count);
+  for (std::size_t k = 0; k < part.count; ++k)
+    for (std::size_t i = 0; i < spots.size(); ++i) sight.ask(k * spots.size() + i, part.spots[k], spots[i], part.lift);
+  const std::vector<std::uint8_t>& seen = sight.answers();
+  std::uint32_t bits = 0;
+  for (std::size_t k = 0; k < part.count; ++k)
+    for (std::size_t i = 0; i < spots.size(); ++i)
+      if (seen[k * spots.size() + i] != 0) bits |= 1u << i;
+  return bits;
+}
+
+/// The middles of the up to eight texels around that belong to the same chart.
+std::vector<SurfaceSpot> TexelParts::neighboursOf(std::size_t texel) const {
+  const auto chartOf = [&](std::size_t t) {
+    const TriangleRef& ref = page_.trianglesOf(t).front();
+    return atlas_.surfaces[ref.surface].charts[ref.triangle];
+  };
+  std::vector<SurfaceSpot> spots;
+  TexelFootprint footprint;
+  const TexelCoord at = page_.coords[texel];
+  for (int dy = -1; dy <= 1; ++dy)
+    for (int dx = -1; dx <= 1; ++dx) {
+      if (dx == 0 && dy == 0) continue;
+      const auto near = texelAt(at.x + dx, at.y + dy);
+      if (near && chartOf(*near) == chartOf(texel) && footprint.clip(atlas_, page_, *near) > 0.0)
+        spots.push_back(spotOf(footprint.centroid()));
+    }
+  return spots;
+}
+
+/// PageTexels::coords are in order of tiles, then of rows.
+std::optional<std::size_t> TexelParts::texelAt(int x, int y) const {
+  if (x < 0 || y < 0 || x >= page_.width || y >= page_.height) return std::nullopt;
+  const auto key = [](const TexelCoord& at) { return std::array<int, 4>{at.y / 4, at.x / 4, at.y % 4, at.x % 4}; };
+  const TexelCoord wanted{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
+  const auto found = std::ranges::lower_bound(page_.coords, key(wanted), {}, key);
+  if (found == page_.coords.end() || found->x != wanted.x || found->y != wanted.y) return std::nullopt;
+  return static_cast<std::size_t>(found - page_.coords.begin());
+}
+
+/// Whether most rays meet the backs of single-sided surfaces first, as those of invalid texels do.
+bool TexelParts::isInside(const SurfaceSpot& spot, float lift) const {
+  RayPacket packet;
+  const Frame frame = frameAround(spot.ng);
+  for (int i = 0; i < kInsideRays; ++i) {
+    const Vec2 u((static_cast<float>(i % 4) + 0.5f) / 4.0f, (static_cast<float>(i) + 0.5f) / kInsideRays);
+    packet.set(i, spot.p + lift * spot.ng, frame.fromLocal(sampleCosineHemisphere(u)));
+  }
+  rays_.intersect(packet, TraceMode::Packet);
+  int backs = 0;
+  for (int i = 0; i < kInsideRays; ++i)
+    if (packet.hit(i)) {
+      const HitSurface hit = rays_.surfaceAt(packet, i);
+      backs += hit.backFace && !materials_.material(hit.material).doubleSided ? 1 : 0;
+    }
+  return 2 * backs > kInsideRays;
+}
+
+}  // namespace lumel

@@ -1,0 +1,61 @@
+// A texel may lie in two places: a floor that runs on beneath a wall has texels with a part on either side of it, and
+// no light of one side may stand for the other. Here a texel's footprint falls into parts that cannot see each other
+// along the surface, and one of them is what the texel's value stands for.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "baker/rays/ray_scene.h"
+#include "lightmap/texels/texels.h"
+
+namespace lumel {
+
+/// A point of a surface: its place and unit geometric normal, in world space.
+struct SurfaceSpot {
+  Vec3 p{0};
+  Vec3 ng{0, 0, 1};
+};
+
+/// The part of a divided texel that its value stands for, by a few of its points: what sees one of them belongs to it.
+struct TexelPart {
+  static constexpr std::size_t kMostSpots = 4;
+  std::array<SurfaceSpot, kMostSpots> spots;
+  std::size_t count = 0;  // of spots, at least 1
+  float lift = 0.0f;      // metres above the surface at which its points look at each other
+};
+
+/// Finds the parts of a page's texels. Sight is tested by short rays a twentieth of a texel above the surface: what is
+/// lower divides nothing, and neither does what is cut out or see-through (leaves, nets, panes).
+class TexelParts {
+ public:
+  /// Keeps references to its arguments.
+  TexelParts(const RayScene& rays, const Materials& materials, const Atlas& atlas, const PageTexels& page)
+      : rays_(rays), materials_(materials), atlas_(atlas), page_(page) {}
+
+  /// Bit i: texel first + i may be divided, since from its middle some corner of its footprint is out of sight.
+  /// Precondition: count <= kLanes.
+  std::uint32_t suspects(std::size_t first, std::size_t count) const;
+
+  /// The part of a texel that counts; nothing where the texel is whole. Of several parts it is the one that sees most
+  /// of the neighbouring texels of its chart, and among these the largest; parts inside of solids come last.
+  std::optional<TexelPart> find(std::size_t texel) const;
+
+  /// Bit i: spots[i] sees the part. Precondition: at most kLanes spots.
+  std::uint32_t members(const TexelPart& part, std::span<const SurfaceSpot> spots) const;
+
+ private:
+  std::vector<SurfaceSpot> neighboursOf(std::size_t texel) const;
+  std::optional<std::size_t> texelAt(int x, int y) const;
+  bool isInside(const SurfaceSpot& spot, float lift) const;
+
+  const RayScene& rays_;
+  const Materials& materials_;
+  const Atlas& atlas_;
+  const PageTexels& page_;
+};
+
+}  // namespace lumel
