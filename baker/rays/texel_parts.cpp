@@ -19,8 +19,8 @@ constexpr float kDrawnIn = 1.0f / 256.0f;
 /// Points that are drawn of a texel that may be divided, beside its corners.
 constexpr std::uint32_t kDrawn = 16;
 constexpr std::size_t kMostCorners = 16;
-/// Rays that tell whether a point lies inside of something.
-constexpr int kInsideRays = kLanes;
+/// Rays that tell how far a part lies inside of something.
+constexpr int kOpennessRays = kLanes;
 
 /// Collects questions of who sees whom and traces them sixteen at a time. A question is answered with no as soon as one
 /// of its rays is blocked.
@@ -181,7 +181,7 @@ std::optional<TexelPart> TexelParts::find(std::size_t texel) const {
     for (std::size_t first = 0; first < neighbours.size(); first += kLanes)
       score += std::popcount(members(
           part, std::span(neighbours).subspan(first, std::min<std::size_t>(kLanes, neighbours.size() - first))));
-    if (isInside(part.spots[0], lift)) score -= 100.0;
+    score *= openness(part.spots[0], lift);
     if (best && score <= bestScore) continue;
     best = part;
     bestScore = score;
@@ -230,22 +230,22 @@ std::optional<std::size_t> TexelParts::texelAt(int x, int y) const {
   return static_cast<std::size_t>(found - page_.coords.begin());
 }
 
-/// Whether most rays meet the backs of single-sided surfaces first, as those of invalid texels do.
-bool TexelParts::isInside(const SurfaceSpot& spot, float lift) const {
+/// Share of the rays from a point that do not meet the back of a single-sided surface first.
+double TexelParts::openness(const SurfaceSpot& spot, float lift) const {
   RayPacket packet;
   const Frame frame = frameAround(spot.ng);
-  for (int i = 0; i < kInsideRays; ++i) {
-    const Vec2 u((static_cast<float>(i % 4) + 0.5f) / 4.0f, (static_cast<float>(i) + 0.5f) / kInsideRays);
+  for (int i = 0; i < kOpennessRays; ++i) {
+    const Vec2 u((static_cast<float>(i % 4) + 0.5f) / 4.0f, (static_cast<float>(i) + 0.5f) / kOpennessRays);
     packet.set(i, spot.p + lift * spot.ng, frame.fromLocal(sampleCosineHemisphere(u)));
   }
   rays_.intersect(packet, TraceMode::Packet);
   int backs = 0;
-  for (int i = 0; i < kInsideRays; ++i)
+  for (int i = 0; i < kOpennessRays; ++i)
     if (packet.hit(i)) {
       const HitSurface hit = rays_.surfaceAt(packet, i);
       backs += hit.backFace && !materials_.material(hit.material).doubleSided ? 1 : 0;
     }
-  return 2 * backs > kInsideRays;
+  return 1.0 - static_cast<double>(backs) / kOpennessRays;
 }
 
 }  // namespace lumel

@@ -50,7 +50,7 @@ class TexelParts {
  private:
   std::vector<SurfaceSpot> neighboursOf(std::size_t texel) const;
   std::optional<std::size_t> texelAt(int x, int y) const;
-  bool isInside(const SurfaceSpot& spot, float lift) const;
+  double openness(const SurfaceSpot& spot, float lift) const;
 
   const RayScene& rays_;
   const Materials& materials_;
