@@ -31,7 +31,8 @@ bool isOff(const AuditStratum& stratum) {
 template <class Belongs>
 AuditStratum judge(std::string name, std::span<const AuditDraw> draws, const AuditPopulation& population,
                    double meanLight, Belongs belongs) {
-  AuditStratum stratum{.name = std::move(name)};
+  AuditStratum stratum;
+  stratum.name = std::move(name);
   double map = 0.0, paths = 0.0, weights = 0.0;
   for (const AuditDraw& draw : draws) {
     if (!belongs(draw)) continue;
@@ -138,12 +139,10 @@ AuditReport audit(const LightTransport& transport, const Atlas& atlas, const std
     }
     const std::span<const std::uint32_t> members = population.ofDecades(from, to);
     stratum.texels = members.size();
-    if (mayLookAgain(stratum))
-      lookAgain(stratum, members, tracer, population, population.meanLight(), belongs);
+    if (mayLookAgain(stratum)) lookAgain(stratum, members, tracer, population, population.meanLight(), belongs);
     if (stratum.drawn > 0) report.decades.push_back(std::move(stratum));
     from = to + 1;
   }
-  // An earlier audit draw count decides which objects can be judged.
   for (std::uint32_t object = 0; object < objectNames.size(); ++object) {
     const std::span<const std::uint32_t> members = population.ofObject(object);
     if (members.empty()) continue;
@@ -156,8 +155,7 @@ AuditReport audit(const LightTransport& transport, const Atlas& atlas, const std
     }
     report.objects.push_back(std::move(stratum));
     AuditStratum& judged = report.objects.back();
-    if (mayLookAgain(judged))
-      lookAgain(judged, members, tracer, population, population.meanLight(), belongs);
+    if (mayLookAgain(judged)) lookAgain(judged, members, tracer, population, population.meanLight(), belongs);
   }
   std::ranges::stable_sort(report.objects, [](const AuditStratum& a, const AuditStratum& b) {
     if (a.wrong != b.wrong) return a.wrong;

@@ -56,11 +56,10 @@ struct AuditReport {
 /// Compares `flat`, one finished map per page, with path tracing. A texel is drawn with a probability that is the mean
 /// of three: even over all texels, even over decades of the map's brightness, and even over objects, so that neither
 /// dark rooms nor small things are missed (Hansen and Hurwitz 1943). A stratum's ratio of means has the variance of its
-/// weighed residuals. What is off by more than kAuditTolerance and three standard errors is drawn from again, four times
-/// as often and with other paths, and is called wrong if these say so too.
-/// Of a texel that is partly inside of something only the open share counts, by rays of the audit's own: a point of
-/// which every ray meets the back of a single-sided surface is inside.
-/// `objectNames`: by instance. Deterministic for any number of threads.
+/// weighed residuals. What is off by more than kAuditTolerance and three standard errors is drawn from again, four
+/// times as often and with other paths, and is called wrong if these say so too. Of a texel that is partly inside of
+/// something only the open share counts, by rays of the audit's own: a point of which every ray meets the back of a
+/// single-sided surface is inside. `objectNames`: by instance. Deterministic for any number of threads.
 AuditReport audit(const LightTransport& transport, const Atlas& atlas, const std::vector<PageTexels>& texels,
                   std::span<const Image* const> flat, std::span<const Image* const> aux,
                   std::span<const std::string> objectNames, const AuditOptions& options);

@@ -22,7 +22,9 @@ class Random {
   }
   /// In [0, count).
   std::size_t below(std::size_t count) {
-    return static_cast<std::size_t>((static_cast<unsigned __int128>(next()) * count) >> 64);
+    constexpr double kPerStep = 0x1p-53;
+    const double share = static_cast<double>(next() >> 11) * kPerStep;
+    return std::min(static_cast<std::size_t>(share * static_cast<double>(count)), count - 1);
   }
 
  private:
@@ -50,8 +52,8 @@ void sortByKey(std::size_t items, std::size_t count, KeyOf keyOf, std::vector<st
   for (std::size_t i = 0; i < items; ++i) sorted[at[keyOf(i)]++] = static_cast<std::uint32_t>(i);
 }
 
-std::span<const std::uint32_t> rangeOf(const std::vector<std::uint32_t>& sorted, const std::vector<std::uint32_t>& first,
-                                       std::size_t from, std::size_t to) {
+std::span<const std::uint32_t> rangeOf(const std::vector<std::uint32_t>& sorted,
+                                       const std::vector<std::uint32_t>& first, std::size_t from, std::size_t to) {
   return std::span(sorted).subspan(first[from], first[to] - first[from]);
 }
 
@@ -120,8 +122,8 @@ std::vector<AuditDraw> AuditPopulation::draw(std::size_t count, std::uint64_t se
     const double probability =
         (1.0 / static_cast<double>(size()) +
          1.0 / (static_cast<double>(usedDecades_.size()) * static_cast<double>(ofDecades(decade, decade).size())) +
-         1.0 / (static_cast<double>(usedObjects_.size()) *
-                static_cast<double>(ofObject(objectOf(draw.texel)).size()))) /
+         1.0 /
+             (static_cast<double>(usedObjects_.size()) * static_cast<double>(ofObject(objectOf(draw.texel)).size()))) /
         3.0;
     draw.weight = 1.0 / probability;
   }

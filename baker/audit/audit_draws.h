@@ -54,9 +54,9 @@ class AuditPopulation {
   std::vector<std::uint32_t> firstOfPage_;  // [pages + 1]
   std::vector<std::int8_t> decades_;
   std::vector<std::uint32_t> objects_;
-  std::vector<std::uint32_t> byDecade_, byObject_;        // texels, sorted
+  std::vector<std::uint32_t> byDecade_, byObject_;            // texels, sorted
   std::vector<std::uint32_t> firstOfDecade_, firstOfObject_;  // into these; one more than there are
-  std::vector<std::uint32_t> usedDecades_, usedObjects_;  // that have texels
+  std::vector<std::uint32_t> usedDecades_, usedObjects_;      // that have texels
   int darkest_ = 0;
   int brightest_ = 0;
   double meanLight_ = 0.0;

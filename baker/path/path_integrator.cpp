@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
+#include <optional>
 
 #include "baker/light/direct_light.h"
 #include "baker/light/near_lights.h"
@@ -59,12 +61,15 @@ class WaveTracer {
     for (PunctualChoice& choice : punctual_) choice.learnt = LearntChoice(transport.punctual.groups());
   }
 
-  WaveResult run(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count);
+  WaveResult run(std::uint32_t pageIndex, const PageTexels& page, std::span<const std::uint32_t> texels,
+                 std::span<const std::uint32_t> scrambles);
 
  private:
-  void startTexels(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count);
+  void startTexels(std::uint32_t pageIndex, const PageTexels& page, std::span<const std::uint32_t> texels,
+                   std::span<const std::uint32_t> scrambles);
   void runPilot(std::uint32_t samples);
   void startStretch(std::uint32_t first);
+  TexelSampler samplerOf(std::size_t lane, std::uint32_t stretch) const;
   void startSample();
   void lightTexels();
   void lightFromNear();
@@ -99,6 +104,7 @@ class WaveTracer {
   std::array<std::optional<TexelPart>, kLanes> parts_;  // of divided texels: what their points lie on
   LightLanes lanes_;  // receivers of the light that is sampled next
   std::array<Path, kLanes> paths_;
+  std::array<std::uint32_t, kLanes> scrambles_{};  // 0: none
   std::array<TexelSampler, kLanes> samplers_;
   SampleLanes samples_;
   NetLanes net_;
@@ -108,8 +114,9 @@ class WaveTracer {
   WaveResult result_;
 };
 
-WaveResult WaveTracer::run(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count) {
-  startTexels(pageIndex, page, first, count);
+WaveResult WaveTracer::run(std::uint32_t pageIndex, const PageTexels& page, std::span<const std::uint32_t> texels,
+                           std::span<const std::uint32_t> scrambles) {
+  startTexels(pageIndex, page, texels, scrambles);
   const auto samples = static_cast<std::uint32_t>(options_.samples);
   if (learns()) runPilot(samples);
   for (std::uint32_t begin = 0; begin < samples;) {
@@ -129,25 +136,26 @@ WaveResult WaveTracer::run(std::uint32_t pageIndex, const PageTexels& page, std:
   return std::move(result_);
 }
 
-void WaveTracer::startTexels(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count) {
+void WaveTracer::startTexels(std::uint32_t pageIndex, const PageTexels& page, std::span<const std::uint32_t> texels,
+                             std::span<const std::uint32_t> scrambles) {
   page_ = pageIndex;
-  for (std::size_t lane = 0; lane < count; ++lane) {
-    coords_[lane] = page.coords[first + lane];
-    const double area = footprints_[lane].clip(atlas_, page, first + lane);
+  for (std::size_t lane = 0; lane < texels.size(); ++lane) {
+    coords_[lane] = page.coords[texels[lane]];
+    const double area = footprints_[lane].clip(atlas_, page, texels[lane]);
     TexelResult& texel = result_.texels[lane];
     texel.coverage = static_cast<float>(std::min(area, 1.0));
-    texel.probed = (first + lane) % kProbeStride == 0;
+    texel.probed = texels[lane] % kProbeStride == 0;
     covered_[lane] = area > 0.0;
     NearLights near = nearLightsOf(transport_.punctual, footprints_[lane]);
     near_[lane] = std::move(near.lights);
     perReach2_[lane] = near.perReach2;
     anyNear_ = anyNear_ || near.perReach2 > 0.0f;
-    samplers_[lane] = TexelSampler(options_.seed, pageIndex, coords_[lane].x, coords_[lane].y);
+    if (!scrambles.empty()) scrambles_[lane] = scrambles[lane];
+    samplers_[lane] = samplerOf(lane, 0);
     samples_.setTexel(static_cast<int>(lane), samplers_[lane]);
   }
   texelParts_.emplace(transport_.rays, transport_.materials, atlas_, page);
-  forEachLane(texelParts_->suspects(first, count),
-              [&](std::size_t lane) { parts_[lane] = texelParts_->find(first + lane); });
+  forEachLane(texelParts_->suspects(texels), [&](std::size_t lane) { parts_[lane] = texelParts_->find(texels[lane]); });
 }
 
 /// A point of the texel; of a divided texel one on the part that counts, found by rejection.
@@ -163,6 +171,12 @@ SurfacePoint WaveTracer::pointOf(std::size_t lane, Vec2 u) const {
     point = footprints_[lane].sample(Vec2(next - glm::floor(next)));
   }
   return point;
+}
+
+/// The sampler of a texel in the stretch that begins with sample `stretch`.
+TexelSampler WaveTracer::samplerOf(std::size_t lane, std::uint32_t stretch) const {
+  const TexelSampler sampler(options_.seed + (std::uint64_t{stretch} << 32), page_, coords_[lane].x, coords_[lane].y);
+  return scrambles_[lane] == 0 ? sampler : TexelSampler(sampler.seedOf(scrambles_[lane]), 0, 0, 0);
 }
 
 /// Takes samples that only teach which lights arrive, and that are not part of the result.
@@ -184,8 +198,7 @@ void WaveTracer::runPilot(std::uint32_t samples) {
 void WaveTracer::startStretch(std::uint32_t first) {
   for (PunctualChoice& choice : punctual_) choice.learnt.learn();
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    samplers_[lane] =
-        TexelSampler(options_.seed + (std::uint64_t{first} << 32), page_, coords_[lane].x, coords_[lane].y);
+    samplers_[lane] = samplerOf(lane, first);
     samples_.setTexel(static_cast<int>(lane), samplers_[lane]);
   }
 }
@@ -392,8 +405,16 @@ PathIntegrator::PathIntegrator(const LightTransport& transport, const Encoding& 
 
 WaveResult PathIntegrator::bakeWave(std::uint32_t pageIndex, const PageTexels& page, std::size_t first,
                                     std::size_t count) const {
+  std::array<std::uint32_t, kLanes> texels;
+  std::iota(texels.begin(), texels.end(), static_cast<std::uint32_t>(first));
+  return traceTexels(pageIndex, page, std::span(texels).first(count), {});
+}
+
+WaveResult PathIntegrator::traceTexels(std::uint32_t pageIndex, const PageTexels& page,
+                                       std::span<const std::uint32_t> texels,
+                                       std::span<const std::uint32_t> scrambles) const {
   WaveTracer tracer(transport_, encoding_, atlas_, options_);
-  return tracer.run(pageIndex, page, first, count);
+  return tracer.run(pageIndex, page, texels, scrambles);
 }
 
 }  // namespace lumel

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "baker/light/light_transport.h"
@@ -54,6 +55,11 @@ class PathIntegrator {
   /// Samples texels [first, first + count) of `page`, count <= kLanes. Every kProbeStride-th texel of the page is
   /// probed. The result depends on the arguments alone, never on the thread.
   WaveResult bakeWave(std::uint32_t pageIndex, const PageTexels& page, std::size_t first, std::size_t count) const;
+
+  /// The same for any texels of the page, at most kLanes. `scrambles`: empty, or one for each, so that a texel can be
+  /// sampled again and again by other paths.
+  WaveResult traceTexels(std::uint32_t pageIndex, const PageTexels& page, std::span<const std::uint32_t> texels,
+                         std::span<const std::uint32_t> scrambles) const;
 
  private:
   const LightTransport& transport_;

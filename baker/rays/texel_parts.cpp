@@ -126,11 +126,12 @@ void addDrawn(const TexelFootprint& footprint, std::vector<SurfaceSpot>& spots) 
 
 }  // namespace
 
-std::uint32_t TexelParts::suspects(std::size_t first, std::size_t count) const {
+std::uint32_t TexelParts::suspects(std::span<const std::uint32_t> texels) const {
+  const std::size_t count = texels.size();
   SightTest sight(rays_, materials_, count);
   TexelFootprint footprint;
   for (std::size_t i = 0; i < count; ++i) {
-    if (!(footprint.clip(atlas_, page_, first + i) > 0.0)) continue;
+    if (!(footprint.clip(atlas_, page_, texels[i]) > 0.0)) continue;
     const SurfaceSpot middle = spotOf(footprint.centroid());
     const float lift = liftOf(footprint, atlas_, rays_);
     for (const SurfaceSpot& corner : cornersOf(footprint, middle)) sight.ask(i, middle, corner, lift);

@@ -36,9 +36,9 @@ class TexelParts {
   TexelParts(const RayScene& rays, const Materials& materials, const Atlas& atlas, const PageTexels& page)
       : rays_(rays), materials_(materials), atlas_(atlas), page_(page) {}
 
-  /// Bit i: texel first + i may be divided, since from its middle some corner of its footprint is out of sight.
-  /// Precondition: count <= kLanes.
-  std::uint32_t suspects(std::size_t first, std::size_t count) const;
+  /// Bit i: texels[i] may be divided, since from its middle some corner of its footprint is out of sight.
+  /// Precondition: at most kLanes texels.
+  std::uint32_t suspects(std::span<const std::uint32_t> texels) const;
 
   /// The part of a texel that counts; nothing where the texel is whole. Of several parts it is the one that sees most
   /// of the neighbouring texels of its chart, and among these the largest; parts inside of solids come last.
