@@ -31,8 +31,7 @@ AuditTracer::AuditTracer(const LightTransport& transport, const Atlas& atlas, co
       flat_(flat),
       aux_(aux),
       population_(population),
-      options_(options),
-      kernels_(Projection::Raw) {}
+      options_(options) {}
 
 void AuditTracer::trace(std::span<AuditDraw> draws) {
   // Texels of a page that lie near each other share a wave, so that their rays find the same things.
@@ -66,7 +65,7 @@ void AuditTracer::traceWave(std::span<AuditDraw* const> wave, Counts& counts) co
     texels[i] = static_cast<std::uint32_t>(population_.indexOnPage(wave[i]->texel));
     seeds[i] = wave[i]->seed;
   }
-  const PathIntegrator integrator(transport_, kernels_, atlas_,
+  const PathIntegrator integrator(transport_, *encoding_, atlas_,
                                   {.samples = kPathsPerDraw,
                                    .bounces = options_.bounces,
                                    .indirectOnly = options_.indirectOnly,

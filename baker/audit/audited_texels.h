@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "baker/audit/audit.h"
 #include "baker/audit/audit_draws.h"
 #include "baker/path/path_integrator.h"
+#include "lightmap/maps/encoding.h"
 
 namespace lumel {
 
@@ -45,7 +47,7 @@ class AuditTracer {
   std::span<const Image* const> aux_;
   const AuditPopulation& population_;
   AuditOptions options_;
-  RnmKernels kernels_;
+  std::shared_ptr<const Encoding> encoding_ = flatEncoding();  // nothing but the flat map is looked at
   std::uint64_t rays_ = 0;
   std::uint64_t seeds_ = 0;
 };

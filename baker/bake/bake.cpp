@@ -373,4 +373,19 @@ std::uint64_t sessionKey(const LitScene& scene, const Atlas& atlas, const std::v
   return GatherIntegrator(scene.transport(), *options.encoding, atlas, texels, gatherOptionsOf(options)).key();
 }
 
+void auditBake(const LitScene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
+               const BakeOptions& options, std::span<const std::string> objectNames, BakeResult& result) {
+  std::vector<const Image*> flat, aux;
+  for (const BakedPage& page : result.pages) {
+    flat.push_back(&page.flat);
+    aux.push_back(&page.aux);
+  }
+  const double rays = static_cast<double>(result.stats.rays + result.stats.shadowRays);
+  result.audit = audit(scene.transport(), atlas, texels, flat, aux, objectNames,
+                       {.rays = std::max(kAuditRays, static_cast<std::uint64_t>(kAuditShare * rays)),
+                        .bounces = options.bounces,
+                        .indirectOnly = options.indirectOnly,
+                        .seed = options.seed});
+}
+
 }  // namespace lumel

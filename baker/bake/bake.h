@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "baker/audit/audit.h"
 #include "baker/bake/bake_options.h"
 #include "lightmap/seams/seam_maps.h"
 #include "lightmap/seams/seams.h"
@@ -48,6 +50,7 @@ struct BakeResult {
   std::vector<BakedPage> pages;
   Seams seams;  // for finishPages; none where the options say so
   BakeStats stats;
+  std::optional<AuditReport> audit;  // auditBake
 };
 
 class LitScene;
@@ -67,5 +70,15 @@ Expected<BakeResult> bake(const LitScene& scene, const Atlas& atlas, const std::
 /// Tells the states of one bake from those of others (readState): a hash of options, texels and surfaces.
 std::uint64_t sessionKey(const LitScene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
                          const BakeOptions& options);
+
+/// Path tracing for an audit takes this share of the rays of the bake, which is about a twentieth of its time, and at
+/// least kAuditRays, below which hardly anything can be told.
+inline constexpr double kAuditShare = 0.02;
+inline constexpr std::uint64_t kAuditRays = 400'000;
+
+/// Judges the finished pages of `result` by path tracing (audit.h), and keeps the report in it. `objectNames`: of the
+/// scene's instances.
+void auditBake(const LitScene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
+               const BakeOptions& options, std::span<const std::string> objectNames, BakeResult& result);
 
 }  // namespace lumel

@@ -13,6 +13,7 @@
 #include "baker/files/names/file_names.h"
 #include "baker/files/read/earlier_layout.h"
 #include "baker/files/write/bake_files.h"
+#include "baker/light/lit_scene.h"
 #include "lightmap/atlas/atlas.h"
 #include "lightmap/texels/texels.h"
 #include "scene/base/parallel.h"
@@ -28,6 +29,8 @@ constexpr int kDilateByPadding = -1;
 
 /// Auto: for the gather. Path tracing is the reference and stays as it is.
 enum class Denoise { Auto, On, Off };
+/// Auto: from preview upwards, for the gather.
+enum class Audit { Auto, On, Off };
 /// Least samples where a target error is given and --samples is not: the first at which an error is known well enough.
 constexpr int kLeastSamples = 32;
 
@@ -37,6 +40,8 @@ struct BakeArguments : SceneArguments {
   fs::path layoutFrom;
   BakeOptions bake;
   Denoise denoise = Denoise::Auto;
+  Audit audit = Audit::Auto;
+  float auditFailAbove = 0.0f;  // 0: never
   int dilate = kDilateByPadding;
   bool half = false;
   bool strict = false;
@@ -74,6 +79,12 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
   options.choice("projection", a.projection, {"raw", "flat", "fit"},
                  "How light is spread over the three maps: as in the literature (raw), scaled so that a flat normal is "
                  "exact (flat), least squares (fit)");
+  options.choice(
+      "audit", a.audit, {"auto", "on", "off"},
+      "Path trace texels drawn at random and compare them with the finished maps: finds light that is wrong, "
+      "which the standard error does not know; auto: with --integrator gather from 64 samples on");
+  options.share("audit-fail-above", a.auditFailAbove, {0.0f, 1e6f},
+                "End with exit code 4, result written, where the audit finds light off by more (3% or 0.03). 0: never");
   options.integer("seed", a.bake.seed, "Seed of the sampling; the same seed gives the same bytes");
 }
 
@@ -170,6 +181,11 @@ void printSummary(const fs::path& output, const AtlasResult& atlas, const BakeRe
     std::fprintf(stderr, "steps at seams %.2g%% (%.2g%% before), at most %.2g%% (%.2g%%)\n",
                  100.0 * stats.seams.after.rms, 100.0 * stats.seams.before.rms, 100.0 * stats.seams.after.most,
                  100.0 * stats.seams.before.most);
+  if (result.audit && result.audit->judged()) {
+    const AuditStratum& all = result.audit->all;
+    std::fprintf(stderr, "audit: light is %.4g times that of path tracing (95%%: %.4g to %.4g, %zu texels)\n",
+                 all.ratio, all.ratio - 1.96 * all.standardError, all.ratio + 1.96 * all.standardError, all.drawn);
+  }
   std::fprintf(stderr, "%.1f s, %.1f million rays (%.1f million per second of bake), %.0f MiB at the peak\n", seconds,
                rays / 1e6, stats.seconds > 0 ? rays / 1e6 / stats.seconds : 0.0,
                static_cast<double>(record.peakMemoryBytes) / (1024.0 * 1024.0));
@@ -183,6 +199,36 @@ int samplesOf(const BakeArguments& a) {
 bool denoises(const BakeArguments& a) {
   if (a.denoise != Denoise::Auto) return a.denoise == Denoise::On;
   return a.bake.integrator == Integrator::Gather;
+}
+
+bool audits(const BakeArguments& a) {
+  if (a.auditFailAbove > 0.0f) return true;
+  if (a.audit != Audit::Auto) return a.audit == Audit::On;
+  return a.bake.integrator == Integrator::Gather && samplesOf(a) >= samplesOf(Quality::Preview);
+}
+
+std::vector<std::string> objectNames(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const Instance& instance : scene.instances) names.push_back(instance.name);
+  return names;
+}
+
+/// What is wrong for certain, one line each.
+std::vector<std::string> auditWarnings(const AuditReport& report) {
+  std::vector<std::string> lines;
+  const auto add = [&](const AuditStratum& stratum) {
+    if (!stratum.wrong) return;
+    char text[256];
+    std::snprintf(
+        text, sizeof text, "audit: %s: light is %.3g times that of path tracing (+- %.2g), most at (%.4g, %.4g, %.4g)",
+        stratum.name.c_str(), stratum.ratio, 1.96 * stratum.standardError, static_cast<double>(stratum.position.x),
+        static_cast<double>(stratum.position.y), static_cast<double>(stratum.position.z));
+    lines.emplace_back(text);
+  };
+  add(report.all);
+  for (const AuditStratum& stratum : report.decades) add(stratum);
+  for (const AuditStratum& stratum : report.objects) add(stratum);
+  return lines;
 }
 
 BakeRecord recordOf(const BakeArguments& a, int dilate, nlohmann::ordered_json settings) {
@@ -230,6 +276,7 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   const int samples = samplesOf(a);
   context.settings["samples"] = samples;
   context.settings["denoise"] = denoises(a) ? "on" : "off";
+  context.settings["audit"] = audits(a) ? "on" : "off";
   const int dilate = a.dilate == kDilateByPadding ? (a.atlas.padding + 1) / 2 : a.dilate;
   BakeRecord record = recordOf(a, dilate, context.settings);
 
@@ -258,12 +305,21 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   const auto texels = findTexels(atlas->atlas);
   returnFreeMemory();
   clock.start("bake");
-  auto baked = bake(*scene, atlas->atlas, texels, record.bakeOptions, progress);
+  auto lit = LitScene::build(*scene, record.bakeOptions.bounces != 0);
+  if (!lit) return lit.error();
+  auto baked = bake(**lit, atlas->atlas, texels, record.bakeOptions, progress);
   if (!baked) return baked.error();
   clock.start("finish");
   baked->stats.seams = finishPages(baked->pages, atlas->atlas, texels,
                                    {.denoise = denoises(a), .rings = dilate, .seams = &baked->seams});
   if (a.half) cutToHalf(*baked);
+  if (audits(a)) {
+    clock.start("audit");
+    auditBake(**lit, atlas->atlas, texels, record.bakeOptions, objectNames(*scene), *baked);
+    const std::vector<std::string> found = auditWarnings(*baked->audit);
+    baked->stats.notes.insert(baked->stats.notes.end(), found.begin(), found.end());
+  }
+  lit->reset();
   clock.stop();
   if (progress.cancelled()) return interrupted();
 
@@ -284,6 +340,9 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
     return Error{ErrorKind::Threshold, "--strict: " + std::to_string(warnings) + " warning" +
                                            (warnings == 1 ? "" : "s") + "; they are in " +
                                            (a.output / "bake.json").string()};
+  if (a.auditFailAbove > 0.0f && baked->audit->worst() > static_cast<double>(a.auditFailAbove))
+    return Error{ErrorKind::Threshold, a.output.string() + ": the audit found light that is wrong by more than " +
+                                           "--audit-fail-above; the result is written, bake.json says where"};
   return {};
 }
 

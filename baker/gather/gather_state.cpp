@@ -208,10 +208,10 @@ bool GatherState::fits(const GatherScene& scene) const {
   const auto has = [](const auto& values, std::size_t wanted) { return values.size() == wanted; };
   bool fit = has(waves, scene.waves.size()) && has(errors.ofWaves, scene.waves.size()) && has(errors.squares, count) &&
              has(errors.sums, count) && has(backFaces, count) && has(samplesOf, count) && has(buried, count) &&
-             has(divided, count) &&
-             (has(warmBacks, count) || (warmBacks.empty() && samples > 0)) && has(reflectance, cached) &&
-             has(direct, shining) && has(seen, shining) && has(sums.flat, summed) && has(coverage, summed) &&
-             has(inside, summed) && has(probes, isWarm ? scene.waves.probes() : 0) && has(uneven, isWarm ? cached : 0);
+             has(divided, count) && (has(warmBacks, count) || (warmBacks.empty() && samples > 0)) &&
+             has(reflectance, cached) && has(direct, shining) && has(seen, shining) && has(sums.flat, summed) &&
+             has(coverage, summed) && has(inside, summed) && has(probes, isWarm ? scene.waves.probes() : 0) &&
+             has(uneven, isWarm ? cached : 0);
   fit = fit && has(sums.maps, isWarm ? scene.encoding.mapCount() : 0);
   for (const std::vector<Vec3>& map : sums.maps) fit = fit && has(map, summed);
   const std::size_t sources = scene.strategies.empty() ? 0 : scene.strategies.size() + 1;

@@ -133,9 +133,8 @@ Expected<void> findDivided(const GatherScene& scene, GatherState& state, Progres
     const TexelParts parts(scene.transport.rays, scene.transport.materials, scene.atlas, scene.texels[wave.page]);
     std::array<std::uint32_t, kLanes> texels;
     std::iota(texels.begin(), texels.end(), wave.first);
-    forEachLane(parts.suspects(std::span(texels).first(wave.count)), [&](std::size_t lane) {
-      state.divided[wave.start + lane] = parts.find(wave.first + lane) ? 1 : 0;
-    });
+    forEachLane(parts.suspects(std::span(texels).first(wave.count)),
+                [&](std::size_t lane) { state.divided[wave.start + lane] = parts.find(wave.first + lane) ? 1 : 0; });
   });
 }
 

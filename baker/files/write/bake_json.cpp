@@ -1,5 +1,7 @@
 #include "baker/files/write/bake_json.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "baker/files/names/bake_format.h"
@@ -148,6 +150,43 @@ Json describeError(const BakeStats& stats) {
           {"nonFiniteSamples", stats.nonFiniteSamples}};
 }
 
+Json describeStratum(const AuditStratum& stratum, const Atlas& atlas) {
+  const auto finite = [](double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); };
+  Json json = {
+      {"name", stratum.name},
+      {"texels", stratum.texels},
+      {"drawn", stratum.drawn},
+      {"ratio", finite(stratum.ratio)},
+      {"interval95",
+       {finite(stratum.ratio - 1.96 * stratum.standardError), finite(stratum.ratio + 1.96 * stratum.standardError)}},
+      {"detectable", stratum.detectable()},
+      {"wrong", stratum.wrong}};
+  if (stratum.wrong && stratum.page < atlas.pages.size()) {
+    json["page"] = stratum.page;
+    json["texel"] = {stratum.texel.x, stratum.texel.y};
+    json["position"] = toJson(stratum.position);
+  }
+  return json;
+}
+
+/// What path tracing of texels drawn at random says of the maps; null where nothing was audited.
+Json describeAudit(const BakeResult& result, const Atlas& atlas) {
+  if (!result.audit || !result.audit->judged()) return nullptr;
+  const AuditReport& audit = *result.audit;
+  const auto describe = [&](const std::vector<AuditStratum>& strata) {
+    constexpr std::size_t kMostListed = 50;
+    Json rows = Json::array();
+    for (std::size_t i = 0; i < std::min(strata.size(), kMostListed); ++i)
+      rows.push_back(describeStratum(strata[i], atlas));
+    return rows;
+  };
+  return {{"all", describeStratum(audit.all, atlas)},
+          {"decades", describe(audit.decades)},
+          {"objects", describe(audit.objects)},
+          {"objectsNotJudged", audit.objectsNotJudged},
+          {"rays", audit.rays}};
+}
+
 Json describeRun(const BakeStats& stats, const BakeRecord& record) {
   Json stages = Json::object();
   double seconds = 0.0;
@@ -190,6 +229,7 @@ std::string describeBake(const Scene& scene, const AtlasResult& atlas, const Bak
   json["cost"] = {
       {"texels", result.stats.texels}, {"rays", result.stats.rays}, {"shadowRays", result.stats.shadowRays}};
   json["error"] = describeError(result.stats);
+  json["audit"] = describeAudit(result, atlas.atlas);
   json["warnings"] = warnings;
   json["notes"] = result.stats.notes;
   json["charts"] = describeCharts(atlas.atlas);
