@@ -33,7 +33,9 @@ struct BakeOptions {
   // the machine.
   float timeBudgetSeconds = 0.0f;
   bool indirectOnly = false;  // without what arrives straight from lights, shining surfaces and the sky
-  bool seams = true;          // find where lookups from both sides of charts' borders shall agree
+  // Find where lookups from both sides of charts' borders shall agree. Exact for tiles; on levels with few texels a chart
+  // it moves partly covered ones too far.
+  bool seams = false;
   std::uint64_t seed = 1;
   std::shared_ptr<const Encoding> encoding = rnmEncoding();
 };

@@ -99,9 +99,10 @@ void declareOptions(OptionTable& options, BakeArguments& a) {
   options.flag("half", a.half, "Write half floats: half the size, values up to 65504");
   options.choice("denoise", a.denoise, {"auto", "on", "off"},
                  "Average texels with those around them that agree within their noise; auto: with --integrator gather");
-  options.choice("seams", a.bake.seams, {"off", "on"},
-                 "Make lookups from both sides agree where charts or objects meet and light goes on; off with "
-                 "--dilate 0");
+  options.choice(
+      "seams", a.bake.seams, {"off", "on"},
+      "Make lookups from both sides agree where charts or objects meet and light goes on: for levels made of "
+      "tiles; where charts are a few texels wide their borders get less exact. Nothing with --dilate 0");
   options.integer("dilate", a.dilate, {0, 1024}, "Rings of texels grown around charts; 0: none").defaultText =
       "half of --padding";
   declareOutsidePaths(options, a);

@@ -81,32 +81,6 @@ void growInto(Image& image, int maxRings, const Wanted& wanted, const Known& kno
   }
 }
 
-/// A few sweeps of means over the filled texels (Jacobi steps of a membrane between the known ones), each from the last
-/// sweep's values, take out the steps where rings from different sides met.
-template <class Readable>
-void smooth(Image& image, std::span<const std::size_t> filled, int sweeps, const Readable& readable) {
-  const auto channels = static_cast<std::size_t>(image.channels);
-  std::vector<float> next(filled.size() * channels);
-  for (int sweep = 0; sweep < sweeps; ++sweep) {
-    parallelFor(filled.size(), 1024, [&](std::size_t first, std::size_t last) {
-      for (std::size_t k = first; k < last; ++k)
-        for (std::size_t c = 0; c < channels; ++c) {
-          double sum = 0;
-          int count = 0;
-          forEachNeighbour(image.width, image.height, filled[k], [&](std::size_t other) {
-            if (!readable(filled[k], other)) return;
-            sum += image.pixels[other * channels + c];
-            ++count;
-          });
-          next[k * channels + c] = static_cast<float>(sum / count);
-        }
-    });
-    for (std::size_t k = 0; k < filled.size(); ++k)
-      std::copy_n(next.begin() + static_cast<std::ptrdiff_t>(k * channels), channels,
-                  image.pixels.begin() + static_cast<std::ptrdiff_t>(filled[k] * channels));
-  }
-}
-
 bool sameSize(const Image& image, const TexelMask& mask) {
   return image.width == mask.width && image.height == mask.height &&
          mask.known.size() == static_cast<std::size_t>(mask.width) * static_cast<std::size_t>(mask.height);
@@ -126,19 +100,13 @@ void fillHoles(Image& image, const TexelMask& valid, const std::vector<std::uint
                const std::vector<std::uint8_t>& holes) {
   LUMEL_CHECK(sameSize(image, valid));
   LUMEL_CHECK(chartIds.size() == valid.known.size() && holes.size() == valid.known.size());
-  constexpr int kSmoothingSweeps = 8;
   std::vector<std::uint8_t> known = valid.known;
-  std::vector<std::size_t> filled;
   const auto readable = [&](std::size_t texel, std::size_t other) {
     return known[other] != 0 && chartIds[other] == chartIds[texel];
   };
   growInto(
       image, std::numeric_limits<int>::max(), [&](std::size_t i) { return holes[i] != 0 && known[i] == 0; }, readable,
-      [&](std::size_t i) {
-        known[i] = 1;
-        filled.push_back(i);
-      });
-  smooth(image, filled, kSmoothingSweeps, readable);
+      [&](std::size_t i) { known[i] = 1; });
 }
 
 }  // namespace lumel

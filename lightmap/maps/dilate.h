@@ -19,8 +19,10 @@ struct TexelMask {
 /// nearest ring first. `mask` gains the filled texels. Values of known texels are untouched.
 void dilate(Image& image, TexelMask& mask, int rings);
 
-/// Gives every texel in `holes` (covered but invalid) the values of the nearest known texels of the same chart,
-/// smoothly; `chartIds` per texel (0 = none). A hole whose chart knows no texel at all keeps its value.
+/// Gives every texel in `holes` (covered but invalid) the values of the nearest known texels of the same chart;
+/// `chartIds` per texel (0 = none). Between two sides, as beneath a wall, there is a step in the middle and no ramp, so
+/// that lookups beside the wall read the light of their own side. A hole whose chart knows no texel at all keeps its
+/// value.
 void fillHoles(Image& image, const TexelMask& valid, const std::vector<std::uint32_t>& chartIds,
                const std::vector<std::uint8_t>& holes);
 

@@ -41,7 +41,7 @@ TEST(SeamsOfBakes, TilesUnderAnEvenSkyAreOne) {
   TestScene test = twoTiles();
   addGutter(test);
   test.scene.environment.color = Vec3(1.0f);
-  BakeResult baked = test.bake({.samples = 64});
+  BakeResult baked = test.bake({.samples = 64, .seams = true});
   const SeamFigures figures = finish(test, baked);
   EXPECT_NEAR(figures.texels, kTexels, 1e-3);
   EXPECT_LT(figures.after.most, 1e-4);
@@ -67,7 +67,7 @@ TEST(SeamsOfBakes, AWallOnTheSeamKeepsItsShadow) {
     sun.intensity = std::numbers::pi_v<float> * std::numbers::sqrt2_v<float>;
     sun.direction = glm::normalize(Vec3(-1, -1, 0));
     test.scene.lights.push_back(sun);
-    BakeResult baked = test.bake({.samples = 64});
+    BakeResult baked = test.bake({.samples = 64, .seams = true});
     const SeamFigures figures = finish(test, baked);
     EXPECT_EQ(figures.points, standing ? 0u : 2u * kTexels);
     for (int y = 2; y < kTexels + 2; ++y) {
@@ -84,7 +84,7 @@ TEST(SeamsOfBakes, AreTheSameForAnyNumberOfThreads) {
   test.scene.environment.color = Vec3(1.0f);
   std::vector<BakeResult> bakes;
   for (const int threads : {1, 4}) {
-    bakes.push_back(test.bake({.samples = 16}, threads));
+    bakes.push_back(test.bake({.samples = 16, .seams = true}, threads));
     EXPECT_EQ(finish(test, bakes.back()).points, 2u * kTexels);
   }
   EXPECT_TRUE(sameBytes(bakes[0], bakes[1]));

@@ -105,7 +105,7 @@ TEST(FillHoles, ConstantSurroundingsGiveThatConstant) {
   for (const float value : c.image.pixels) EXPECT_EQ(value, 7.0f);
 }
 
-TEST(FillHoles, SmoothBetweenItsSides) {
+TEST(FillHoles, TakesTheLightOfTheSideThatItLiesOn) {
   HoleCase c;
   for (int y = 0; y < 8; ++y)
     for (int x = 0; x < 8; ++x) *c.image.at(x, y) = static_cast<float>(x);
@@ -113,9 +113,7 @@ TEST(FillHoles, SmoothBetweenItsSides) {
     for (int x = 2; x < 6; ++x) c.makeHole(x, y);
   fillHoles(c.image, c.valid, c.charts, c.holes);
   for (int y = 0; y < 8; ++y)
-    for (int x = 0; x < 8; ++x) EXPECT_NEAR(*c.image.at(x, y), x, 0.6) << x << ", " << y;  // a ramp, nearly
-  for (int y = 0; y < 8; ++y)
-    for (int x = 1; x < 8; ++x) EXPECT_GT(*c.image.at(x, y), *c.image.at(x - 1, y));
+    for (int x = 2; x < 6; ++x) EXPECT_EQ(*c.image.at(x, y), x < 4 ? 1.0f : 6.0f) << x << ", " << y;
 }
 
 TEST(FillHoles, ReadsTheOwnChartOnly) {
