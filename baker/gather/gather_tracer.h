@@ -53,6 +53,9 @@ class GatherTracer {
     spots_.reserve(kManySpots + kLanes);
   }
 
+  /// From now on hits choose among punctual lights as `punctual` says, which must not have been learnt from hits.
+  void choosePunctual(PunctualChoice punctual) { punctual_ = std::move(punctual); }
+
   /// What the rays of a packet found; flightOf(lane) tells of each.
   template <class FlightOf>
   void arriveAll(const RayPacket& packet, const TexelMap::Lookup& lookup, FlightOf flightOf) {

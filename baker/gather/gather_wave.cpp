@@ -19,11 +19,15 @@ void GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const 
   if (coveredCount_ == 0) return;
   for (std::size_t lane = 0; lane < wave_.count; ++lane)
     if ((wave_.first + lane) % kProbeStride == 0) sink.probedLane = lane;
+  const auto seenToArrive = [&] {
+    return punctualChoice(wave_.scene.transport.punctual, wave_.scene.strategies, spreads);
+  };
   GatherTracer tracer(wave_.scene.transport, wave_.scene.map, wave_.scene.reflectance, wave_.scene.lastDepth,
-                      punctualChoice(wave_.scene.transport.punctual, wave_.scene.strategies, spreads), sink);
+                      seenToArrive(), sink);
   for (std::uint32_t sample = first; sample < end;) {
     const NetRange net = netAt(sample, end);
     if (!spreads.empty()) gatherLight(net, spreads, sink);
+    if (!spreads.empty() && isPilot(net.first)) tracer.choosePunctual(seenToArrive());
     near_.gather(wave_, net, sink);
     wave_.points.draw(wave_.samplers, kFootprint, net.first, std::min(WavePoints::kMost, net.count()));
     sink.tallied = !spreads.empty() && isPilot(net.first);

@@ -64,7 +64,7 @@ double solidAngleBelow(double x0, double x1, double z0, double z1, double h) {
 
 // A lamp a thousandth of a texel above it: a texel's light is its solid angle times the intensity by its area, in every
 // texel, whether the spot under the lamp lies in the middle, on a border or in a corner. Samples at points of the texel
-// lose 9% of it at a hundredth and 77% at a thousandth.
+// alone lost 9% of it 1 mm above one of 62.5 mm, and 77% at 0.1 mm.
 TEST(DirectLight, LampsCloseToATexel) {
   const double texel = 0.5;
   for (const auto& [place, height] : {std::pair{Vec2(0.21f, 0.3f), 0.1f}, std::pair{Vec2(0.21f, 0.3f), 0.008f},
