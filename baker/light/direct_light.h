@@ -113,8 +113,8 @@ std::uint64_t directLight(const LightTransport& transport, const LightLanes& lan
     ns.set(lane, lanes.receivers[lane].ns);
     rayStart.set(lane, lanes.receivers[lane].rayStart);
   }
-  return directLight(transport, ReceiverLanes{lanes.active, p, ng, ns, rayStart, false, lanes.perReach2}, samples, patternBase,
-                     mode, density, add, punctual);
+  return directLight(transport, ReceiverLanes{lanes.active, p, ng, ns, rayStart, false, lanes.perReach2}, samples,
+                     patternBase, mode, density, add, punctual);
 }
 
 }  // namespace lumel

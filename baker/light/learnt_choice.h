@@ -20,31 +20,32 @@ namespace lumel {
 class LearntChoice {
  public:
   explicit LearntChoice(std::size_t groups = 0)
-      : expected_(groups, 0.0), arrived_(groups, 0.0), factors_(groups, 1.0f) {}
+      : seen_(groups, 0.0), arrived_(groups, 0.0), factors_(groups, 1.0f), evenShares_(groups, kEvenUnknown) {}
 
   /// Tells whether there is anything to choose.
   bool isUseful() const { return factors_.size() > 1; }
   /// Enters what samples would bring unshadowed, and what of it arrived.
   void record(std::size_t group, float unshadowed, float arrived) {
-    expected_[group] += static_cast<double>(unshadowed);
+    seen_[group] += static_cast<double>(unshadowed);
     arrived_[group] += static_cast<double>(arrived);
   }
   /// Makes the choice follow what was recorded until now. Precondition: no sample was drawn whose scramble goes on.
   void learn();
 
   float factor(std::size_t group) const { return factors_[group]; }
-  /// `left` is the share of a receiver's unshadowed light that the factors leave.
-  float evenShare(float left) const { return hasLearnt_ ? kEven * (1.0f - left) : kEvenAtFirst; }
+  /// Returns the even share that a group asks for where it would bring all light. Where several would, e is the mean of
+  /// these by what each would bring.
+  float evenShare(std::size_t group) const { return evenShares_[group]; }
 
-  /// While nothing is known, half of the samples are shared evenly.
-  static constexpr float kEvenAtFirst = 0.5f;
+  /// A group that was never sampled may be hidden or not: half of the samples are shared evenly.
+  static constexpr float kEvenUnknown = 0.5f;
   /// A tenth costs the lights that arrive at most as much in variance.
   static constexpr float kEven = 0.1f;
 
  private:
-  std::vector<double> expected_, arrived_;  // sums of luminance by group
+  std::vector<double> seen_, arrived_;  // sums of luminance by group: unshadowed, and what arrived
   std::vector<float> factors_;
-  bool hasLearnt_ = false;
+  std::vector<float> evenShares_;
 };
 
 }  // namespace lumel

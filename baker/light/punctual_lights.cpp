@@ -272,13 +272,14 @@ std::vector<std::size_t> PunctualLights::around(const Vec3& p, float distance) c
 /// number where none brings anything. `u` becomes what is left of it within the group.
 std::size_t PunctualLights::chooseGroup(std::span<const float> unshadowed, const LearntChoice* learnt, float& u,
                                         float& probability) const {
-  float whole = 0.0f, total = 0.0f, possible = 0.0f;
+  float whole = 0.0f, total = 0.0f, asked = 0.0f, possible = 0.0f;
   for (std::size_t g = 0; g < unshadowed.size(); ++g) {
     whole += unshadowed[g];
+    asked += unshadowed[g] * (learnt ? learnt->evenShare(g) : 0.0f);
     total += unshadowed[g] * (learnt ? learnt->factor(g) : 1.0f);
     possible += unshadowed[g] > 0.0f ? 1.0f : 0.0f;
   }
-  const float even = learnt == nullptr ? 0.0f : total > 0.0f ? learnt->evenShare(total / whole) : 1.0f;
+  const float even = total > 0.0f ? asked / whole : 1.0f;
   const float perTotal = total > 0.0f ? (1.0f - even) / total : 0.0f;
   const float each = possible > 0.0f ? even / possible : 0.0f;
   float before = 0.0f, here = 0.0f;

@@ -102,7 +102,7 @@ class WaveTracer {
   bool anyNear_ = false;
   std::optional<TexelParts> texelParts_;
   std::array<std::optional<TexelPart>, kLanes> parts_;  // of divided texels: what their points lie on
-  LightLanes lanes_;  // receivers of the light that is sampled next
+  LightLanes lanes_;                                    // receivers of the light that is sampled next
   std::array<Path, kLanes> paths_;
   std::array<std::uint32_t, kLanes> scrambles_{};  // 0: none
   std::array<TexelSampler, kLanes> samplers_;

@@ -315,6 +315,34 @@ TEST(PunctualLights, LearntChoicesLeaveNoLightOut) {
   }
 }
 
+// A sun that nothing is known of yet must not starve a lamp that is a thousand times weaker, whatever is known of that.
+TEST(PunctualLights, UnknownLightsLeaveOthersTheirShare) {
+  Light sun, lamp;
+  sun.type = LightType::Directional;
+  sun.direction = {0, -1, 0};
+  sun.intensity = 1000.0f;
+  lamp.position = {0, 1, 0};
+  const PunctualLights lights({sun, lamp});
+  for (const bool lampIsKnown : {false, true}) {
+    LearntChoice learnt(lights.groups());
+    if (lampIsKnown) learnt.record(1, 1.0f, 1.0f);
+    learnt.learn();
+    LaneFlags active, groups;
+    active.fill(1);
+    const Vec3Lanes p;
+    Vec3Lanes n;
+    UnitLanes u;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      n.set(lane, {0, 1, 0});
+      u.u[lane] = (static_cast<float>(lane) + 0.5f) / kLanes;
+    }
+    LightSampleLanes samples;
+    lights.sample({active, p, n, n, p}, u, learnt, samples, groups);
+    // Half of the samples are shared evenly by two.
+    EXPECT_EQ(std::count(groups.begin(), groups.end(), 1), kLanes / 4) << lampIsKnown;
+  }
+}
+
 TEST(PunctualLights, ManyDegenerate) {
   Light light;
   light.position = {0, 1, 0};
