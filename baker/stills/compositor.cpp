@@ -137,14 +137,15 @@ struct Compositor::Impl {
   }
   Vec4 baseColor(const Hit& hit) const {
     const Material& m = *hit.shape->material;
-    Vec4 color = m.baseColor * sample(m.baseColorMap, ColorSpace::Srgb, hit, Vec4(1.0f));
+    Vec4 color = m.baseColor;
+    if (m.baseColorMap) color *= sample(m.baseColorMap, ColorSpace::Srgb, hit, Vec4(Vec3(kMissingColor), 1.0f));
     if (!hit.shape->primitive->colors.empty()) color *= interpolate(hit, hit.shape->primitive->colors);
     return color;
   }
   Vec3 emission(const Hit& hit) const {
     const Material& m = *hit.shape->material;
-    if (m.emission == Vec3(0.0f)) return m.emission;
-    return m.emission * Vec3(sample(m.emissionMap, ColorSpace::Srgb, hit, Vec4(1.0f)));
+    if (m.emission == Vec3(0.0f) || !m.emissionMap) return m.emission;
+    return m.emission * Vec3(sample(m.emissionMap, ColorSpace::Srgb, hit, Vec4(0.0f)));
   }
 
   RTCRayHit trace(const Vec3& origin, const Vec3& direction, float tnear, bool seesAll) const;

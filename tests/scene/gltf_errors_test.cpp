@@ -355,7 +355,7 @@ TEST_F(GltfFiles, MissingTexturesAreWarningsAndOutsideOnesErrors) {
   EXPECT_TRUE(mentions(scene->report.warnings[0], "images/0: "));
   EXPECT_TRUE(mentions(scene->report.warnings[0], "gone.png: no such file"));
   EXPECT_TRUE(scene->images[0].encoded.empty());
-  EXPECT_EQ(scene->materials[0].baseColor, Vec4(0.5f, 0.25f, 0.125f, 1));
+  EXPECT_EQ(scene->materials[0].baseColor, Vec4(kMissingColor * Vec3(0.5f, 0.25f, 0.125f), 1.0f));
   write(folder_ / "scene" / "gone.png", "not a picture");
   scene = loadWith("b.bin");
   ASSERT_TRUE(scene);
