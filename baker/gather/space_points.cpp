@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "baker/gather/gather_tracer.h"
+#include "baker/gather/light_effort.h"
 #include "baker/gather/wave_texels.h"
 #include "baker/light/direct_light.h"
 #include "baker/rays/flush_denormals.h"
@@ -50,7 +51,8 @@ struct SpaceSink {
 void gatherWave(const LightTransport& transport, const SurfaceCache& surfaces, std::span<const Vec3> points,
                 std::uint32_t firstPoint, const SpaceOptions& options, std::span<SpaceLight> found) {
   SpaceSink sink{surfaces};
-  GatherTracer tracer(transport, surfaces.map, surfaces.reflectance, surfaces.lastDepth, sink);
+  GatherTracer tracer(transport, surfaces.map, surfaces.reflectance, surfaces.lastDepth,
+                      punctualChoice(transport.punctual, {}, {}), sink);
   LaneFlags active{};
   Vec3Lanes p, none;
   SampleLanes samples;
