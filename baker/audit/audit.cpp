@@ -19,8 +19,9 @@ constexpr double kSigmas = 3.0;
 /// How many times as many draws a suspected stratum gets, and at most how many strata.
 constexpr std::size_t kSecondLook = 4;
 constexpr std::size_t kMostSecondLooks = 8;
-/// Where paths find nothing at all, a map is wrong that holds more than this share of the mean light.
-constexpr double kNoLight = 1e-6;
+/// Strata that hold less than this share of the mean light, by map and by paths, are not judged: so few paths reach
+/// sealed corners that their variance is not known.
+constexpr double kTooDark = 1e-4;
 
 bool isOff(const AuditStratum& stratum) {
   const double off = std::abs(stratum.ratio - 1.0);
@@ -41,10 +42,10 @@ AuditStratum judge(std::string name, std::span<const AuditDraw> draws, const Aud
     map += draw.weight * draw.map;
     paths += draw.weight * draw.paths;
   }
-  if (stratum.drawn == 0) return stratum;
+  if (stratum.drawn == 0 || std::max(map, paths) < kTooDark * meanLight * weights) return stratum;
   if (paths > 0.0)
     stratum.ratio = map / paths;
-  else if (map > kNoLight * meanLight * weights)
+  else if (map > 0.0)
     stratum.ratio = std::numeric_limits<double>::infinity();
   double squares = 0.0, most = -1.0;
   for (const AuditDraw& draw : draws) {

@@ -63,6 +63,9 @@ AuditPopulation::AuditPopulation(const Atlas& atlas, const std::vector<PageTexel
                                  std::span<const Image* const> flat)
     : texels_(texels), firstOfPage_{0} {
   std::uint32_t mostObject = 0;
+  // A texel's own light would put those into the brightest decade that are too bright by noise.
+  std::vector<double> sums(atlas.charts.size()), counts(atlas.charts.size());
+  std::vector<std::uint32_t> charts;
   for (std::size_t p = 0; p < texels.size(); ++p) {
     const PageTexels& page = texels[p];
     for (std::size_t i = 0; i < page.size(); ++i) {
@@ -71,13 +74,18 @@ AuditPopulation::AuditPopulation(const Atlas& atlas, const std::vector<PageTexel
                          3 * (static_cast<std::size_t>(at.y) * static_cast<std::size_t>(flat[p]->width) + at.x);
       const float light = luminance(Vec3(rgb[0], rgb[1], rgb[2]));
       meanLight_ += static_cast<double>(light);
-      decades_.push_back(static_cast<std::int8_t>(lumel::decadeOf(light)));
-      const Surface& surface = atlas.surfaces[page.trianglesOf(i).front().surface];
+      const TriangleRef& triangle = page.trianglesOf(i).front();
+      const Surface& surface = atlas.surfaces[triangle.surface];
+      charts.push_back(surface.charts[triangle.triangle]);
+      sums[charts.back()] += static_cast<double>(light);
+      counts[charts.back()] += 1.0;
       objects_.push_back(static_cast<std::uint32_t>(surface.instance));
       mostObject = std::max(mostObject, objects_.back());
     }
-    firstOfPage_.push_back(static_cast<std::uint32_t>(decades_.size()));
+    firstOfPage_.push_back(static_cast<std::uint32_t>(charts.size()));
   }
+  for (const std::uint32_t chart : charts)
+    decades_.push_back(static_cast<std::int8_t>(lumel::decadeOf(static_cast<float>(sums[chart] / counts[chart]))));
   if (decades_.empty()) return;
   meanLight_ /= static_cast<double>(decades_.size());
   sortByKey(

@@ -24,7 +24,7 @@ struct AuditDraw {
 /// The covered texels of all pages, numbered through page by page, with their brightness and objects.
 class AuditPopulation {
  public:
-  /// The decade of texels without light, or with less than 1e-30.
+  /// The decade of charts without light, or with less than 1e-30.
   static constexpr int kDarkest = -31;
 
   AuditPopulation(const Atlas& atlas, const std::vector<PageTexels>& texels, std::span<const Image* const> flat);
@@ -33,7 +33,7 @@ class AuditPopulation {
   double meanLight() const { return meanLight_; }
   int darkest() const { return darkest_; }
   int brightest() const { return brightest_; }
-  /// Decade d holds luminances from 10^d to 10^(d + 1).
+  /// By the mean luminance of the texel's chart: decade d holds 10^d to 10^(d + 1).
   int decadeOf(std::uint32_t texel) const { return decades_[texel]; }
   std::uint32_t objectOf(std::uint32_t texel) const { return objects_[texel]; }
   std::uint32_t pageOf(std::uint32_t texel) const;

@@ -78,12 +78,11 @@ Expected<void> GatherIntegrator::run(GatherState& state, Progress& progress, con
 
 /// After it the cache is as the state says.
 Expected<void> GatherIntegrator::warmUpIfCold(GatherState& state, Progress& progress) {
+  auto divided = findDivided(scene_, progress);
+  if (!divided) return divided.error();
+  divided_ = std::move(*divided);
+  scene_.divided = divided_;
   if (!state.isWarm) {
-    if (auto found = findDivided(scene_, state, progress); !found) {
-      state = begin();
-      return found;
-    }
-    scene_.divided = state.divided;
     if (scene_.levels.count > 0)
       if (auto warm = warmUp(scene_, state, progress); !warm) {
         state = begin();
@@ -92,7 +91,6 @@ Expected<void> GatherIntegrator::warmUpIfCold(GatherState& state, Progress& prog
     state.makeSums(scene_);
     state.isWarm = 1;
   }
-  scene_.divided = state.divided;
   if (scene_.levels.count > 0) map_.setUneven(state.uneven);
   scene_.reflectance = state.reflectance;
   return {};

@@ -97,6 +97,7 @@ class GatherIntegrator {
   const GatherOptions options_;
   TexelMap map_;
   Waves waves_;
+  std::vector<DividedTexel> divided_;
   GatherScene scene_;
 };
 

@@ -1,6 +1,7 @@
 // What a gather reads: the scene, its texels, and how many bounces of light the cache holds.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -12,6 +13,7 @@
 #include "baker/gather/waves.h"
 #include "baker/light/direct_light.h"
 #include "baker/light/light_transport.h"
+#include "baker/rays/texel_parts.h"
 #include "lightmap/maps/encoding.h"
 
 namespace lumel {
@@ -36,6 +38,12 @@ struct CacheLevels {
   }
 };
 
+/// A texel that lies in several places, numbered as in TexelMap, and the part that all that is known of it holds for.
+struct DividedTexel {
+  std::uint32_t texel = 0;
+  TexelPart part;
+};
+
 /// What every wave reads, and what stays the same from pass to pass.
 struct GatherScene {
   const LightTransport& transport;
@@ -51,8 +59,15 @@ struct GatherScene {
   bool indirectOnly = false;
   std::optional<TraceMode> gatherMode{};       // of the texels' rays; else as CoherencePilot says
   std::vector<LightStrategy> strategies{};     // of the texels' own light
-  std::span<const std::uint8_t> divided{};     // GatherState::divided, once it is known
+  std::span<const DividedTexel> divided{};     // in order of texels, once they are known
   std::span<const PackedColor> reflectance{};  // of the map's texels, once the warm-up has found it
+
+  /// Those of the texels [first, first + count).
+  std::span<const DividedTexel> dividedAmong(std::size_t first, std::size_t count) const {
+    const auto from = std::ranges::lower_bound(divided, first, {}, &DividedTexel::texel);
+    const auto to = std::ranges::lower_bound(from, divided.end(), first + count, {}, &DividedTexel::texel);
+    return {from, to};
+  }
 
   /// Levels of the cache, as the length of a row.
   std::size_t stored() const { return static_cast<std::size_t>(levels.count); }

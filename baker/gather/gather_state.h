@@ -72,7 +72,6 @@ struct GatherState {
   std::vector<std::uint32_t> samplesOf;
   std::vector<float> coverage;
   std::vector<std::uint8_t> buried;     // 1: nothing more is gathered for the texel
-  std::vector<std::uint8_t> divided;    // 1: it lies in several places, and all here holds for one of them (TexelParts)
   std::vector<std::uint8_t> warmBacks;  // bits of the warm-up's rays that met backs; empty once the first pass is done
 
   // The cache, per texel:

@@ -127,15 +127,24 @@ void Sweeping::run() {
 
 }  // namespace
 
-Expected<void> findDivided(const GatherScene& scene, GatherState& state, Progress& progress) {
-  return forEachWave(0, scene.waves.size(), state, progress, [&](std::size_t w, GatheredWave&) {
-    const Wave& wave = scene.waves[w];
-    const TexelParts parts(scene.transport.rays, scene.transport.materials, scene.atlas, scene.texels[wave.page]);
-    std::array<std::uint32_t, kLanes> texels;
-    std::iota(texels.begin(), texels.end(), wave.first);
-    forEachLane(parts.suspects(std::span(texels).first(wave.count)),
-                [&](std::size_t lane) { state.divided[wave.start + lane] = parts.find(wave.first + lane) ? 1 : 0; });
+Expected<std::vector<DividedTexel>> findDivided(const GatherScene& scene, Progress& progress) {
+  std::vector<std::vector<DividedTexel>> ofWaves(scene.waves.size());
+  parallelFor(ofWaves.size(), 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t w = first; w < last && !progress.cancelled(); ++w) {
+      const Wave& wave = scene.waves[w];
+      const TexelParts parts(scene.transport.rays, scene.transport.materials, scene.atlas, scene.texels[wave.page]);
+      std::array<std::uint32_t, kLanes> texels;
+      std::iota(texels.begin(), texels.end(), wave.first);
+      forEachLane(parts.suspects(std::span(texels).first(wave.count)), [&](std::size_t lane) {
+        if (const std::optional<TexelPart> part = parts.find(texels[lane]))
+          ofWaves[w].push_back({wave.start + static_cast<std::uint32_t>(lane), *part});
+      });
+    }
   });
+  if (progress.cancelled()) return interrupted();
+  std::vector<DividedTexel> all;
+  for (const std::vector<DividedTexel>& found : ofWaves) all.insert(all.end(), found.begin(), found.end());
+  return all;
 }
 
 Expected<void> warmUp(const GatherScene& scene, GatherState& state, Progress& progress) {
@@ -158,13 +167,14 @@ Expected<void> warmUp(const GatherScene& scene, GatherState& state, Progress& pr
       constant[t] = first[t] + warm[i].relit;
       state.warmBacks[t] = static_cast<std::uint8_t>(warm[i].backs);
       state.backFaces[t] = static_cast<std::uint32_t>(std::popcount(warm[i].backs));
-      state.uneven[t] = warm[i].isUneven() || state.divided[t] != 0 ? 1 : 0;
+      state.uneven[t] = warm[i].isUneven() ? 1 : 0;
       if (!scene.indirectOnly) continue;
       state.direct[t] = warm[i].direct;
       state.seen[t] = warm[i].seen * static_cast<float>(kWarmRays);
     }
   });
   if (!traced) return traced;
+  for (const DividedTexel& texel : scene.divided) state.uneven[texel.texel] = 1;
   std::fill(state.samplesOf.begin(), state.samplesOf.end(), std::uint32_t{kWarmRays});
   findBuried(scene, state);
   Sweeping(scene, state, links, std::move(first), constant).run();

@@ -15,11 +15,9 @@ WaveTexels::WaveTexels(const GatherScene& ofScene, std::uint32_t ofPage, std::si
     covered[lane] = points.covered(lane);
     lightSamples.setTexel(static_cast<int>(lane), samplers[lane]);
   }
-  if (scene.divided.empty()) return;
   const std::size_t start = scene.map.firstOfPage(page) + first;
-  for (std::size_t lane = 0; lane < count; ++lane)
-    if (scene.divided[start + lane] != 0 && covered[lane])
-      if (const std::optional<TexelPart> part = parts.find(first + lane)) points.keepTo(lane, *part, parts);
+  for (const DividedTexel& texel : scene.dividedAmong(start, count))
+    if (covered[texel.texel - start]) points.keepTo(texel.texel - start, texel.part, parts);
 }
 
 Flight WaveTexels::flightOf(std::size_t lane, std::uint32_t sample, const PointLanes& from,

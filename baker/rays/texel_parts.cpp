@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numeric>
 
 #include "baker/rays/sampling.h"
-#include "scene/base/union_find.h"
 
 namespace lumel {
 namespace {
@@ -124,6 +122,35 @@ void addDrawn(const TexelFootprint& footprint, std::vector<SurfaceSpot>& spots) 
   }
 }
 
+/// Points that see each other, by way of others too, are one part: for each the number of its part's first point. From
+/// each point that was reached those are asked that were not yet, so that a whole texel takes one round.
+std::vector<std::uint32_t> partsOf(std::span<const SurfaceSpot> spots, float lift, const RayScene& rays,
+                                   const Materials& materials) {
+  constexpr std::uint32_t kUnknown = 0xffffffffu;
+  std::vector<std::uint32_t> part(spots.size(), kUnknown);
+  for (std::uint32_t first = 0; first < spots.size(); ++first) {
+    if (part[first] != kUnknown) continue;
+    part[first] = first;
+    std::vector<std::uint32_t> reached = {first};
+    for (std::size_t next = 0; next < reached.size(); ++next) {
+      const SurfaceSpot& from = spots[reached[next]];
+      std::vector<std::uint32_t> asked;
+      for (std::uint32_t i = 0; i < spots.size(); ++i)
+        if (part[i] == kUnknown) asked.push_back(i);
+      if (asked.empty()) break;
+      SightTest sight(rays, materials, asked.size());
+      for (std::size_t i = 0; i < asked.size(); ++i) sight.ask(i, from, spots[asked[i]], lift);
+      const std::vector<std::uint8_t>& seen = sight.answers();
+      for (std::size_t i = 0; i < asked.size(); ++i)
+        if (seen[i] != 0) {
+          part[asked[i]] = first;
+          reached.push_back(asked[i]);
+        }
+    }
+  }
+  return part;
+}
+
 }  // namespace
 
 std::uint32_t TexelParts::suspects(std::span<const std::uint32_t> texels) const {
@@ -151,18 +178,8 @@ std::optional<TexelPart> TexelParts::find(std::size_t texel) const {
   const std::size_t corners = spots.size();
   addDrawn(footprint, spots);
 
-  // Points that see each other, by way of others too, are one part.
   const std::size_t count = spots.size();
-  SightTest sight(rays_, materials_, count * count);
-  for (std::size_t i = 0; i < count; ++i)
-    for (std::size_t k = i + 1; k < count; ++k) sight.ask(i * count + k, spots[i], spots[k], lift);
-  const std::vector<std::uint8_t>& seen = sight.answers();
-  std::vector<std::uint32_t> parent(count);
-  std::iota(parent.begin(), parent.end(), 0u);
-  for (std::size_t i = 0; i < count; ++i)
-    for (std::size_t k = i + 1; k < count; ++k)
-      if (seen[i * count + k] != 0) unite(parent, static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(k));
-  for (std::uint32_t i = 0; i < count; ++i) parent[i] = findRoot(parent, i);
+  const std::vector<std::uint32_t> parent = partsOf(spots, lift, rays_, materials_);
   if (std::ranges::count(parent, 0u) == static_cast<std::ptrdiff_t>(count)) return std::nullopt;
 
   const std::vector<SurfaceSpot> neighbours = neighboursOf(texel);
