@@ -11,6 +11,9 @@ namespace {
 
 /// Points look at each other from so many texel widths above the surface.
 constexpr float kLiftTexels = 0.05f;
+/// Points whose normals differ by more than 45 degrees do not see each other because the surface bends away between
+/// them: they are not asked, and count as one place. (Small things have texels that cover several of their sides.)
+constexpr float kSamePlace = 0.7f;
 /// Corners are drawn in by this share of their way to the middle, so that what stands exactly along a texel's border
 /// does not divide it. What is left out is half a per cent of the texel.
 constexpr float kDrawnIn = 1.0f / 256.0f;
@@ -31,10 +34,10 @@ class SightTest {
   void ask(std::size_t question, const SurfaceSpot& a, const SurfaceSpot& b, float lift) {
     const Vec3 from = a.p + lift * a.ng, to = b.p + lift * b.ng;
     const float cosine = glm::dot(a.ng, b.ng);
+    if (cosine < kSamePlace) return;
     if (cosine > 0.9999f) return trace(question, from, to);
     const Vec3 sum = a.ng + b.ng;
     const float length = glm::length(sum);
-    if (!(length > 0.1f)) return trace(question, from, to);
     const float rise = 0.5f * glm::length(b.p - a.p) * std::sqrt(std::max(0.0f, 1.0f - cosine) / (1.0f + cosine));
     const Vec3 over = 0.5f * (a.p + b.p) + sum * ((lift + rise) / length);
     trace(question, from, over);
