@@ -54,7 +54,7 @@ struct AuditReport {
 };
 
 /// Compares `flat`, one finished map per page, with path tracing. A texel is drawn with a probability that is the mean
-/// of three: even over all texels, even over decades of the map's brightness, and even over objects, so that neither
+/// of three: even over all texels, even over decades of the charts' brightness, and even over objects, so that neither
 /// dark rooms nor small things are missed (Hansen and Hurwitz 1943). A stratum's ratio of means has the variance of its
 /// weighed residuals. What is off by more than kAuditTolerance and three standard errors is drawn from again, four
 /// times as often and with other paths, and is called wrong if these say so too. Of a texel that is partly inside of
