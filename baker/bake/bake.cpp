@@ -10,7 +10,7 @@
 #include "baker/bake/gather_session.h"
 #include "baker/gather/doubling_error.h"
 #include "baker/gather/gather_integrator.h"
-#include "baker/gather/waves.h"
+#include "baker/gather/waves/waves.h"
 #include "baker/light/lit_scene.h"
 #include "baker/path/path_integrator.h"
 #include "baker/rays/flush_denormals.h"

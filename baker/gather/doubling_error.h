@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "baker/gather/waves.h"
+#include "baker/gather/waves/waves.h"
 
 namespace lumel {
 

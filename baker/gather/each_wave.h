@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "baker/gather/gather_sink.h"
 #include "baker/gather/gather_state.h"
+#include "baker/gather/waves/gather_sink.h"
 #include "baker/rays/flush_denormals.h"
 #include "scene/base/parallel.h"
 #include "scene/base/progress.h"

@@ -9,9 +9,9 @@
 #include <functional>
 #include <vector>
 
-#include "baker/gather/gather_scene.h"
 #include "baker/gather/gather_state.h"
 #include "baker/gather/surface_cache.h"
+#include "baker/gather/waves/gather_scene.h"
 #include "scene/base/expected.h"
 #include "scene/base/progress.h"
 

@@ -4,8 +4,8 @@
 #include <span>
 
 #include "baker/gather/each_wave.h"
-#include "baker/gather/gather_wave.h"
 #include "baker/gather/stopping.h"
+#include "baker/gather/waves/gather_wave.h"
 #include "scene/base/parallel.h"
 
 namespace lumel {

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "baker/gather/doubling_error.h"
-#include "baker/gather/gather_scene.h"
-#include "baker/gather/inside_points.h"
-#include "baker/gather/light_effort.h"
-#include "baker/gather/packed_color.h"
+#include "baker/gather/waves/gather_scene.h"
+#include "baker/gather/waves/inside_points.h"
+#include "baker/gather/waves/light_effort.h"
+#include "baker/gather/waves/packed_color.h"
 #include "baker/rays/non_finite.h"
 #include "lightmap/maps/projection_probe.h"
 #include "scene/base/expected.h"

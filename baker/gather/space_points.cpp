@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "baker/gather/gather_tracer.h"
-#include "baker/gather/light_effort.h"
-#include "baker/gather/wave_texels.h"
+#include "baker/gather/waves/gather_tracer.h"
+#include "baker/gather/waves/light_effort.h"
+#include "baker/gather/waves/wave_texels.h"
 #include "baker/light/direct_light.h"
 #include "baker/rays/flush_denormals.h"
 #include "baker/rays/sampling.h"

@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
-#include "baker/gather/gather_scene.h"
 #include "baker/gather/gather_state.h"
+#include "baker/gather/waves/gather_scene.h"
 
 namespace lumel {
 

@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
-#include "baker/gather/gather_scene.h"
-#include "baker/gather/packed_color.h"
-#include "baker/gather/texel_map.h"
+#include "baker/gather/waves/gather_scene.h"
+#include "baker/gather/waves/packed_color.h"
+#include "baker/gather/waves/texel_map.h"
 
 namespace lumel {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "baker/gather/warm_wave.h"
+#include "baker/gather/waves/warm_wave.h"
 
 namespace lumel {
 

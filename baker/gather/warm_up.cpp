@@ -11,7 +11,7 @@
 #include "baker/gather/each_wave.h"
 #include "baker/gather/gather_pass.h"
 #include "baker/gather/warm_links.h"
-#include "baker/gather/warm_wave.h"
+#include "baker/gather/waves/warm_wave.h"
 #include "scene/base/parallel.h"
 
 namespace lumel {

@@ -1,8 +1,8 @@
 // The start of the cache, before the first pass.
 #pragma once
 
-#include "baker/gather/gather_scene.h"
 #include "baker/gather/gather_state.h"
+#include "baker/gather/waves/gather_scene.h"
 #include "scene/base/expected.h"
 #include "scene/base/progress.h"
 

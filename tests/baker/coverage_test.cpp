@@ -4,7 +4,7 @@
 
 #include <cstdio>
 
-#include "baker/gather/waves.h"
+#include "baker/gather/waves/waves.h"
 #include "tests/baker/test_scene.h"
 
 namespace lumel {

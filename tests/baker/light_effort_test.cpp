@@ -1,5 +1,5 @@
 // Where light samples go: more to what still varies, fewer to what is settled.
-#include "baker/gather/light_effort.h"
+#include "baker/gather/waves/light_effort.h"
 
 #include <gtest/gtest.h>
 

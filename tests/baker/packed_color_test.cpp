@@ -1,4 +1,4 @@
-#include "baker/gather/packed_color.h"
+#include "baker/gather/waves/packed_color.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "baker/gather/gather_wave.h"
+#include "baker/gather/waves/gather_wave.h"
 #include "baker/rays/sampling.h"
 #include "scene/base/sobol.h"
 #include "tests/baker/test_scene.h"

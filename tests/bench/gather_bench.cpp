@@ -15,8 +15,8 @@
 #include <map>
 #include <optional>
 
-#include "baker/gather/gather_wave.h"
-#include "baker/gather/warm_wave.h"
+#include "baker/gather/waves/gather_wave.h"
+#include "baker/gather/waves/warm_wave.h"
 #include "tests/bench/gather_scenes.h"
 
 namespace lumel {

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <span>
 
-#include "baker/gather/gather_sink.h"
-#include "baker/gather/wave_texels.h"
+#include "baker/gather/waves/gather_sink.h"
+#include "baker/gather/waves/wave_texels.h"
 
 namespace lumel {
 

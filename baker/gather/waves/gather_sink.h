@@ -7,12 +7,12 @@
 #include <span>
 #include <vector>
 
-#include "baker/gather/gather_kernels.h"
-#include "baker/gather/gather_scene.h"
-#include "baker/gather/gather_tracer.h"
-#include "baker/gather/inside_points.h"
-#include "baker/gather/light_effort.h"
-#include "baker/gather/wave_points.h"
+#include "baker/gather/waves/gather_kernels.h"
+#include "baker/gather/waves/gather_scene.h"
+#include "baker/gather/waves/gather_tracer.h"
+#include "baker/gather/waves/inside_points.h"
+#include "baker/gather/waves/light_effort.h"
+#include "baker/gather/waves/wave_points.h"
 #include "baker/rays/non_finite.h"
 #include "baker/rays/stratified_net.h"
 #include "lightmap/maps/projection_probe.h"

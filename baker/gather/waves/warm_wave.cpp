@@ -1,4 +1,4 @@
-#include "baker/gather/warm_wave.h"
+#include "baker/gather/waves/warm_wave.h"
 
 #include <algorithm>
 #include <bit>

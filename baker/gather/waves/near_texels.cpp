@@ -1,4 +1,4 @@
-#include "baker/gather/near_texels.h"
+#include "baker/gather/waves/near_texels.h"
 
 #include <utility>
 

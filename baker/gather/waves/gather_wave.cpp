@@ -1,4 +1,4 @@
-#include "baker/gather/gather_wave.h"
+#include "baker/gather/waves/gather_wave.h"
 
 #include <algorithm>
 #include <bit>

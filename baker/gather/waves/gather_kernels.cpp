@@ -1,9 +1,9 @@
-#include "baker/gather/gather_kernels.h"
+#include "baker/gather/waves/gather_kernels.h"
 
 #include <cstring>
 #include <limits>
 
-#include "baker/gather/texel_map.h"
+#include "baker/gather/waves/texel_map.h"
 #include "baker/rays/non_finite.h"
 #include "baker/rays/sampling.h"
 

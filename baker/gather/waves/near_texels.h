@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "baker/gather/gather_sink.h"
-#include "baker/gather/wave_texels.h"
+#include "baker/gather/waves/gather_sink.h"
+#include "baker/gather/waves/wave_texels.h"
 #include "baker/light/near_lights.h"
 
 namespace lumel {

@@ -1,4 +1,4 @@
-#include "baker/gather/waves.h"
+#include "baker/gather/waves/waves.h"
 
 #include <algorithm>
 #include <utility>

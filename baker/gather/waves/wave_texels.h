@@ -5,10 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "baker/gather/gather_kernels.h"
-#include "baker/gather/gather_scene.h"
-#include "baker/gather/gather_tracer.h"
-#include "baker/gather/wave_points.h"
+#include "baker/gather/waves/gather_kernels.h"
+#include "baker/gather/waves/gather_scene.h"
+#include "baker/gather/waves/gather_tracer.h"
+#include "baker/gather/waves/wave_points.h"
 #include "baker/rays/sample_lanes.h"
 #include "baker/rays/texel_parts.h"
 

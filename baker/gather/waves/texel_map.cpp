@@ -1,4 +1,4 @@
-#include "baker/gather/texel_map.h"
+#include "baker/gather/waves/texel_map.h"
 
 #include <algorithm>
 #include <cmath>

@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "baker/gather/packed_color.h"
-#include "baker/gather/texel_map.h"
+#include "baker/gather/waves/packed_color.h"
+#include "baker/gather/waves/texel_map.h"
 #include "baker/light/direct_light.h"
 #include "baker/light/light_transport.h"
 #include "baker/rays/sampling.h"

@@ -4,8 +4,8 @@
 #include <array>
 #include <cstdint>
 
-#include "baker/gather/packed_color.h"
-#include "baker/gather/wave_points.h"
+#include "baker/gather/waves/packed_color.h"
+#include "baker/gather/waves/wave_points.h"
 #include "baker/rays/lanes.h"
 #include "baker/rays/stratified_net.h"
 #include "lightmap/maps/encoding.h"

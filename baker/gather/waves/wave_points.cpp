@@ -1,4 +1,4 @@
-#include "baker/gather/wave_points.h"
+#include "baker/gather/waves/wave_points.h"
 
 #include <algorithm>
 #include <cmath>

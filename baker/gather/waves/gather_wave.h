@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "baker/gather/gather_sink.h"
-#include "baker/gather/near_texels.h"
-#include "baker/gather/wave_texels.h"
+#include "baker/gather/waves/gather_sink.h"
+#include "baker/gather/waves/near_texels.h"
+#include "baker/gather/waves/wave_texels.h"
 
 namespace lumel {
 

@@ -1,4 +1,4 @@
-#include "baker/gather/wave_texels.h"
+#include "baker/gather/waves/wave_texels.h"
 
 namespace lumel {
 

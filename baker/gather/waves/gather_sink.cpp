@@ -1,4 +1,4 @@
-#include "baker/gather/gather_sink.h"
+#include "baker/gather/waves/gather_sink.h"
 
 #include <algorithm>
 

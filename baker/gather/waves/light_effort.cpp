@@ -1,4 +1,4 @@
-#include "baker/gather/light_effort.h"
+#include "baker/gather/waves/light_effort.h"
 
 #include <algorithm>
 #include <cmath>
