@@ -36,7 +36,7 @@ AuditStratum judge(std::string name, std::span<const AuditDraw> draws, const Aud
   stratum.name = std::move(name);
   double map = 0.0, paths = 0.0, weights = 0.0;
   for (const AuditDraw& draw : draws) {
-    if (!belongs(draw)) continue;
+    if (draw.weight == 0.0 || !belongs(draw)) continue;
     ++stratum.drawn;
     weights += draw.weight;
     map += draw.weight * draw.map;

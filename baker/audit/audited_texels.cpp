@@ -85,6 +85,8 @@ void AuditTracer::traceWave(std::span<AuditDraw* const> wave, Counts& counts) co
     draw.map = open * static_cast<double>(luminance(Vec3(rgb[0], rgb[1], rgb[2])));
     draw.paths = static_cast<double>(luminance(traced.texels[i].sums.mean().flat));
     if (open == 0.0) draw.paths = 0.0;
+    // Partly under something, a texel lies in two places, and its map answers for the one in view.
+    if (open > 0.0 && open < 1.0) draw.weight = 0.0;
   }
 }
 
