@@ -136,8 +136,10 @@ Expected<std::vector<DividedTexel>> findDivided(const GatherScene& scene, Progre
       std::array<std::uint32_t, kLanes> texels;
       std::iota(texels.begin(), texels.end(), wave.first);
       forEachLane(parts.suspects(std::span(texels).first(wave.count)), [&](std::size_t lane) {
-        if (const std::optional<TexelPart> part = parts.find(texels[lane]))
-          ofWaves[w].push_back({wave.start + static_cast<std::uint32_t>(lane), *part});
+        const TexelCoord at = scene.texels[wave.page].coords[texels[lane]];
+        const std::uint32_t seed = TexelSampler(scene.seed, wave.page, at.x, at.y).seedOf(kFootprint);
+        if (const std::optional<PartPoints> points = parts.pointsOf(texels[lane], seed))
+          ofWaves[w].push_back({wave.start + static_cast<std::uint32_t>(lane), *points});
       });
     }
   });

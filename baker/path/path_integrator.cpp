@@ -100,9 +100,8 @@ class WaveTracer {
   std::array<std::vector<NearLight>, kLanes> near_;
   alignas(64) std::array<float, kLanes> perReach2_{};
   bool anyNear_ = false;
-  std::optional<TexelParts> texelParts_;
-  std::array<std::optional<TexelPart>, kLanes> parts_;  // of divided texels: what their points lie on
-  LightLanes lanes_;                                    // receivers of the light that is sampled next
+  std::array<std::vector<std::uint32_t>, kLanes> parts_;  // of divided texels: the numbers of their points
+  LightLanes lanes_;                                      // receivers of the light that is sampled next
   std::array<Path, kLanes> paths_;
   std::array<std::uint32_t, kLanes> scrambles_{};  // 0: none
   std::array<TexelSampler, kLanes> samplers_;
@@ -154,23 +153,18 @@ void WaveTracer::startTexels(std::uint32_t pageIndex, const PageTexels& page, st
     samplers_[lane] = samplerOf(lane, 0);
     samples_.setTexel(static_cast<int>(lane), samplers_[lane]);
   }
-  texelParts_.emplace(transport_.rays, transport_.materials, atlas_, page);
-  forEachLane(texelParts_->suspects(texels), [&](std::size_t lane) { parts_[lane] = texelParts_->find(texels[lane]); });
+  const TexelParts parts(transport_.rays, transport_.materials, atlas_, page);
+  forEachLane(parts.suspects(texels), [&](std::size_t lane) {
+    if (const auto points = parts.pointsOf(texels[lane], samplerOf(lane, 0).seedOf(kFootprint)))
+      parts_[lane] = points->numbers();
+  });
 }
 
-/// A point of the texel; of a divided texel one on the part that counts, found by rejection.
+/// A point of the texel; of a divided texel one on the part that counts.
 SurfacePoint WaveTracer::pointOf(std::size_t lane, Vec2 u) const {
-  constexpr int kMostTries = 256;
-  SurfacePoint point = footprints_[lane].sample(u);
-  if (!parts_[lane]) return point;
-  for (int i = 1; i < kMostTries; ++i) {
-    const SurfaceSpot spot{point.position, point.geometricNormal};
-    if (texelParts_->members(*parts_[lane], {&spot, 1}) != 0) break;
-    // The additive recurrence of the plastic number covers the square evenly, wherever it starts.
-    const Vec2d next = Vec2d(u) + static_cast<double>(i) * Vec2d(0.7548776662466927, 0.5698402909980532);
-    point = footprints_[lane].sample(Vec2(next - glm::floor(next)));
-  }
-  return point;
+  if (const std::vector<std::uint32_t>& own = parts_[lane]; !own.empty())
+    u = sobol2D(own[samples_.sample(static_cast<int>(lane)) % own.size()], samplerOf(lane, 0).seedOf(kFootprint));
+  return footprints_[lane].sample(u);
 }
 
 /// The sampler of a texel in the stretch that begins with sample `stretch`.

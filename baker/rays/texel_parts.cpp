@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "baker/rays/sampling.h"
+#include "scene/base/sobol.h"
 
 namespace lumel {
 namespace {
@@ -19,19 +20,18 @@ constexpr float kSamePlace = 0.7f;
 constexpr float kDrawnIn = 1.0f / 256.0f;
 /// Points that are drawn of a texel that may be divided, beside its corners.
 constexpr std::uint32_t kDrawn = 16;
-constexpr std::size_t kMostCorners = 16;
+constexpr std::size_t kMostCorners = 8;
 /// Rays that tell how far a part lies inside of something.
 constexpr int kOpennessRays = kLanes;
 
-/// Collects questions of who sees whom and traces them sixteen at a time. A question is answered with no as soon as one
-/// of its rays is blocked.
+/// Collects up to 32 questions of who sees whom and traces them sixteen at a time. A question is answered with no as
+/// soon as one of its rays is blocked.
 class SightTest {
  public:
-  SightTest(const RayScene& rays, const Materials& materials, std::size_t questions)
-      : rays_(rays), materials_(materials), seen_(questions, 1) {}
+  SightTest(const RayScene& rays, const Materials& materials) : rays_(rays), materials_(materials) {}
 
   /// Over a bend that points outwards the way leads by a point above it.
-  void ask(std::size_t question, const SurfaceSpot& a, const SurfaceSpot& b, float lift) {
+  void ask(std::uint32_t question, const SurfaceSpot& a, const SurfaceSpot& b, float lift) {
     const Vec3 from = a.p + lift * a.ng, to = b.p + lift * b.ng;
     const float cosine = glm::dot(a.ng, b.ng);
     if (cosine < kSamePlace) return;
@@ -44,42 +44,59 @@ class SightTest {
     trace(question, over, to);
   }
 
-  /// Whether the two of each question see each other.
-  const std::vector<std::uint8_t>& answers() {
+  /// Bits of the questions whose two do not see each other.
+  std::uint32_t blocked() {
     flush();
-    return seen_;
+    return blocked_;
   }
 
  private:
-  void trace(std::size_t question, const Vec3& from, const Vec3& to) {
+  void trace(std::uint32_t question, const Vec3& from, const Vec3& to) {
     const Vec3 way = to - from;
-    if (!(glm::dot(way, way) > 0.0f) || seen_[question] == 0) return;
-    packet_.set(lanes_, from, way);
-    packet_.rayhit.ray.tfar[lanes_] = 1.0f;
+    if (!(glm::dot(way, way) > 0.0f) || (blocked_ >> question & 1u) != 0) return;
+    packet_.set(lanes_, from, way, 1.0f);
     questions_[static_cast<std::size_t>(lanes_)] = question;
     if (++lanes_ == kLanes) flush();
   }
 
   void flush() {
     if (lanes_ == 0) return;
-    rays_.intersect(packet_, TraceMode::Packet);
-    for (int lane = 0; lane < lanes_; ++lane)
-      if (packet_.hit(lane) && blocks(lane)) seen_[questions_[static_cast<std::size_t>(lane)]] = 0;
+    rays_.occluded(packet_, TraceMode::Packet);
+    std::uint32_t met = 0;
+    for (int lane = 0; lane < lanes_; ++lane) met |= packet_.visible(lane) ? 0u : 1u << lane;
+    if (rays_.alphaTestedParts() > 0) met = opaqueAmong(met);
+    forEachLane(met, [&](std::size_t lane) { blocked_ |= 1u << questions_[lane]; });
     packet_.clear();
     lanes_ = 0;
   }
 
-  bool blocks(int lane) const {
-    const ScenePart& part = rays_.parts()[rays_.partOf(packet_, lane)];
-    return materials_.material(part.primitive->material).alphaMode == AlphaMode::Opaque;
+  /// Of the lanes that met something those that met what is neither cut out nor see-through.
+  std::uint32_t opaqueAmong(std::uint32_t met) const {
+    if (met == 0) return 0;
+    RayPacket closest;
+    forEachLane(met, [&](std::size_t l) {
+      const RTCRay16& ray = packet_.ray;
+      closest.set(static_cast<int>(l), {ray.org_x[l], ray.org_y[l], ray.org_z[l]},
+                  {ray.dir_x[l], ray.dir_y[l], ray.dir_z[l]});
+      closest.rayhit.ray.tfar[l] = 1.0f;
+    });
+    rays_.intersect(closest, TraceMode::Packet);
+    std::uint32_t opaque = 0;
+    forEachLane(met, [&](std::size_t l) {
+      const int lane = static_cast<int>(l);
+      if (!closest.hit(lane)) return;
+      const ScenePart& part = rays_.parts()[rays_.partOf(closest, lane)];
+      if (materials_.material(part.primitive->material).alphaMode == AlphaMode::Opaque) opaque |= 1u << l;
+    });
+    return opaque;
   }
 
   const RayScene& rays_;
   const Materials& materials_;
-  RayPacket packet_;
+  ShadowPacket packet_;
   int lanes_ = 0;
-  std::array<std::size_t, kLanes> questions_{};
-  std::vector<std::uint8_t> seen_;
+  std::array<std::uint32_t, kLanes> questions_{};
+  std::uint32_t blocked_ = 0;
 };
 
 SurfaceSpot spotOf(const SurfacePoint& point) { return {point.position, point.geometricNormal}; }
@@ -99,21 +116,41 @@ float liftOf(const TexelFootprint& footprint, const Atlas& atlas, const RayScene
   return std::max(kLiftTexels * width, 16.0f * offsetDistance(corners, rays.translationOf(surface.instance)));
 }
 
-/// The corners of a footprint's pieces, drawn in towards its middle; of many a few.
+/// The corners of a footprint's pieces that reach farthest in eight directions of the page, drawn in towards its
+/// middle.
 std::vector<SurfaceSpot> cornersOf(const TexelFootprint& footprint, const SurfaceSpot& middle) {
+  const auto onPage = [&](const TexelFootprint::Piece& piece, const Vec2d& w) {
+    const std::array<Vec2d, 3>& t = footprint.sources()[piece.source].texels;
+    return t[0] + w.x * (t[1] - t[0]) + w.y * (t[2] - t[0]);
+  };
+  Vec2d mean(0);
+  for (const TexelFootprint::Piece& piece : footprint.pieces())
+    mean += piece.area / footprint.area() * onPage(piece, piece.middle());
+  struct Corner {
+    const TexelFootprint::Piece* piece = nullptr;
+    Vec2 barycentric{0};
+    double distance2 = 0.0;
+  };
+  std::array<Corner, kMostCorners> farthest;
+  const auto enter = [&](const TexelFootprint::Piece& piece, const Vec2& barycentric) {
+    const Vec2d way = onPage(piece, Vec2d(barycentric)) - mean;
+    // The corners of a whole square lie on diagonals, which rounding must not divide.
+    const bool isSteep = std::abs(way.y) > 1.001 * std::abs(way.x);
+    Corner& corner = farthest[(way.x < 0.0 ? 1u : 0u) + (way.y < 0.0 ? 2u : 0u) + (isSteep ? 4u : 0u)];
+    if (const double distance2 = glm::dot(way, way); distance2 > corner.distance2)
+      corner = {&piece, barycentric, distance2};
+  };
+  for (const TexelFootprint::Piece& piece : footprint.pieces()) {
+    const std::array<Vec2, 3>& c = piece.barycentric;
+    for (const Vec2& barycentric : c) enter(piece, barycentric);
+    if (piece.isSquare) enter(piece, c[1] + c[2] - c[0]);  // the fourth corner lies opposite of the first
+  }
   std::vector<SurfaceSpot> corners;
-  const std::span<const TexelFootprint::Piece> pieces = footprint.pieces();
-  for (const TexelFootprint::Piece& piece : pieces) {
-    for (const Vec2& c : piece.barycentric) corners.push_back(spotOf(footprint.pointOn(piece, c)));
-    if (piece.isSquare)  // the fourth corner lies opposite of the first
-      corners.push_back(
-          spotOf(footprint.pointOn(piece, piece.barycentric[1] + piece.barycentric[2] - piece.barycentric[0])));
+  for (const Corner& corner : farthest) {
+    if (corner.piece == nullptr) continue;
+    corners.push_back(spotOf(footprint.pointOn(*corner.piece, corner.barycentric)));
+    corners.back().p += kDrawnIn * (middle.p - corners.back().p);
   }
-  if (corners.size() > kMostCorners) {
-    for (std::size_t i = 0; i < kMostCorners; ++i) corners[i] = corners[i * corners.size() / kMostCorners];
-    corners.resize(kMostCorners);
-  }
-  for (SurfaceSpot& corner : corners) corner.p += kDrawnIn * (middle.p - corner.p);
   return corners;
 }
 
@@ -127,28 +164,26 @@ void addDrawn(const TexelFootprint& footprint, std::vector<SurfaceSpot>& spots) 
 
 /// Points that see each other, by way of others too, are one part: for each the number of its part's first point. From
 /// each point that was reached those are asked that were not yet, so that a whole texel takes one round.
+/// Precondition: at most 32 spots.
 std::vector<std::uint32_t> partsOf(std::span<const SurfaceSpot> spots, float lift, const RayScene& rays,
                                    const Materials& materials) {
-  constexpr std::uint32_t kUnknown = 0xffffffffu;
-  std::vector<std::uint32_t> part(spots.size(), kUnknown);
-  for (std::uint32_t first = 0; first < spots.size(); ++first) {
-    if (part[first] != kUnknown) continue;
-    part[first] = first;
-    std::vector<std::uint32_t> reached = {first};
-    for (std::size_t next = 0; next < reached.size(); ++next) {
-      const SurfaceSpot& from = spots[reached[next]];
-      std::vector<std::uint32_t> asked;
+  std::vector<std::uint32_t> part(spots.size());
+  std::uint32_t unknown = static_cast<std::uint32_t>((std::uint64_t{1} << spots.size()) - 1u);
+  while (unknown != 0) {
+    const auto first = static_cast<std::uint32_t>(std::countr_zero(unknown));
+    std::uint32_t waiting = 1u << first;
+    unknown &= ~waiting;
+    while (waiting != 0) {
+      const auto from = static_cast<std::size_t>(std::countr_zero(waiting));
+      waiting &= waiting - 1u;
+      part[from] = first;
+      if (unknown == 0) continue;
+      SightTest sight(rays, materials);
       for (std::uint32_t i = 0; i < spots.size(); ++i)
-        if (part[i] == kUnknown) asked.push_back(i);
-      if (asked.empty()) break;
-      SightTest sight(rays, materials, asked.size());
-      for (std::size_t i = 0; i < asked.size(); ++i) sight.ask(i, from, spots[asked[i]], lift);
-      const std::vector<std::uint8_t>& seen = sight.answers();
-      for (std::size_t i = 0; i < asked.size(); ++i)
-        if (seen[i] != 0) {
-          part[asked[i]] = first;
-          reached.push_back(asked[i]);
-        }
+        if ((unknown >> i & 1u) != 0) sight.ask(i, spots[from], spots[i], lift);
+      const std::uint32_t reached = unknown & ~sight.blocked();
+      waiting |= reached;
+      unknown &= ~reached;
     }
   }
   return part;
@@ -157,19 +192,15 @@ std::vector<std::uint32_t> partsOf(std::span<const SurfaceSpot> spots, float lif
 }  // namespace
 
 std::uint32_t TexelParts::suspects(std::span<const std::uint32_t> texels) const {
-  const std::size_t count = texels.size();
-  SightTest sight(rays_, materials_, count);
+  SightTest sight(rays_, materials_);
   TexelFootprint footprint;
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::uint32_t i = 0; i < texels.size(); ++i) {
     if (!(footprint.clip(atlas_, page_, texels[i]) > 0.0)) continue;
     const SurfaceSpot middle = spotOf(footprint.centroid());
     const float lift = liftOf(footprint, atlas_, rays_);
     for (const SurfaceSpot& corner : cornersOf(footprint, middle)) sight.ask(i, middle, corner, lift);
   }
-  std::uint32_t suspected = 0;
-  const std::vector<std::uint8_t>& seen = sight.answers();
-  for (std::size_t i = 0; i < count; ++i) suspected |= seen[i] == 0 ? 1u << i : 0u;
-  return suspected;
+  return sight.blocked();
 }
 
 std::optional<TexelPart> TexelParts::find(std::size_t texel) const {
@@ -211,15 +242,32 @@ std::optional<TexelPart> TexelParts::find(std::size_t texel) const {
 }
 
 std::uint32_t TexelParts::members(const TexelPart& part, std::span<const SurfaceSpot> spots) const {
-  SightTest sight(rays_, materials_, spots.size() * part.count);
-  for (std::size_t k = 0; k < part.count; ++k)
-    for (std::size_t i = 0; i < spots.size(); ++i) sight.ask(k * spots.size() + i, part.spots[k], spots[i], part.lift);
-  const std::vector<std::uint8_t>& seen = sight.answers();
-  std::uint32_t bits = 0;
-  for (std::size_t k = 0; k < part.count; ++k)
-    for (std::size_t i = 0; i < spots.size(); ++i)
-      if (seen[k * spots.size() + i] != 0) bits |= 1u << i;
-  return bits;
+  std::uint32_t others = (1u << spots.size()) - 1u;
+  for (std::size_t k = 0; k < part.count && others != 0; ++k) {
+    SightTest sight(rays_, materials_);
+    forEachLane(others,
+                [&](std::size_t i) { sight.ask(static_cast<std::uint32_t>(i), part.spots[k], spots[i], part.lift); });
+    others &= sight.blocked();
+  }
+  return ((1u << spots.size()) - 1u) & ~others;
+}
+
+std::optional<PartPoints> TexelParts::pointsOf(std::size_t texel, std::uint32_t seed) const {
+  const std::optional<TexelPart> part = find(texel);
+  if (!part) return std::nullopt;
+  TexelFootprint footprint;
+  footprint.clip(atlas_, page_, texel);
+  PartPoints points;
+  std::uint32_t any = 0;
+  for (std::uint32_t first = 0; first < PartPoints::kDrawn; first += kLanes) {
+    std::array<SurfaceSpot, kLanes> spots;
+    for (std::uint32_t i = 0; i < kLanes; ++i) spots[i] = spotOf(footprint.sample(sobol2D(first + i, seed)));
+    const std::uint32_t seen = members(*part, spots);
+    points.bits[first / 32] |= seen << first % 32;
+    any |= seen;
+  }
+  if (any == 0) return std::nullopt;
+  return points;
 }
 
 /// The middles of the up to eight texels around that belong to the same chart.

@@ -28,6 +28,22 @@ struct TexelPart {
   float lift = 0.0f;      // metres above the surface at which its points look at each other
 };
 
+/// The points of a divided texel that lie on the part that counts: of the first kDrawn of a sequence over its
+/// footprint, TexelFootprint::sample(sobol2D(i, seed)), bit i tells that point i does. They are found once, since each
+/// takes rays.
+struct PartPoints {
+  static constexpr std::uint32_t kDrawn = 128;
+  std::array<std::uint32_t, kDrawn / 32> bits{};
+
+  /// Numbers of the points.
+  std::vector<std::uint32_t> numbers() const {
+    std::vector<std::uint32_t> all;
+    for (std::uint32_t i = 0; i < kDrawn; ++i)
+      if ((bits[i / 32] >> i % 32 & 1u) != 0) all.push_back(i);
+    return all;
+  }
+};
+
 /// Finds the parts of a page's texels. Sight is tested by short rays a twentieth of a texel above the surface: what is
 /// lower divides nothing, and neither does what is cut out or see-through (leaves, nets, panes).
 class TexelParts {
@@ -46,6 +62,10 @@ class TexelParts {
 
   /// Bit i: spots[i] sees the part. Precondition: at most kLanes spots.
   std::uint32_t members(const TexelPart& part, std::span<const SurfaceSpot> spots) const;
+
+  /// The points of a texel that is divided; nothing where it is whole, or where what counts is less than a hundredth of
+  /// it.
+  std::optional<PartPoints> pointsOf(std::size_t texel, std::uint32_t seed) const;
 
  private:
   std::vector<SurfaceSpot> neighboursOf(std::size_t texel) const;

@@ -38,10 +38,11 @@ struct CacheLevels {
   }
 };
 
-/// A texel that lies in several places, numbered as in TexelMap, and the part that all that is known of it holds for.
+/// A texel that lies in several places, numbered as in TexelMap, and its points of which all that is known of it holds;
+/// of the seed that its footprint pattern has.
 struct DividedTexel {
   std::uint32_t texel = 0;
-  TexelPart part;
+  PartPoints points;
 };
 
 /// What every wave reads, and what stays the same from pass to pass.

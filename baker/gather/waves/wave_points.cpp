@@ -178,34 +178,9 @@ LUMEL_FOR_EACH_CPU void WavePoints::choose(std::span<const Piece> pieces, float 
   }
 }
 
-void WavePoints::keepTo(std::size_t lane, const TexelPart& part, const TexelParts& parts) {
-  kept_[lane] = KeptPart{part, &parts};
-}
-
-/// Points of a divided texel: those that lie on its other parts make room for others of the same draw. Where a whole
-/// draw misses the part it is repeated under another seed.
-void WavePoints::chooseOn(const KeptPart& kept, std::span<const Piece> pieces, float area, std::uint32_t seed,
-                          const std::uint32_t* reversedIndices, Places& places) const {
-  constexpr int kMostDraws = 16;
-  for (int draw = 0; draw < kMostDraws; ++draw) {
-    choose(pieces, area, hashCombine(seed, static_cast<std::uint32_t>(draw)), reversedIndices, places);
-    std::array<SurfaceSpot, kMost> spots;
-    for (std::uint32_t i = 0; i < kMost; ++i) {
-      const Source& source = sources_[places.source[i]];
-      spots[i] = {source.p0 + places.x[i] * source.e1 + places.y[i] * source.e2, source.ng};
-    }
-    const std::uint32_t members = kept.parts->members(kept.part, spots);
-    if (members == 0) continue;
-    const Places drawn = places;
-    for (std::uint32_t i = 0; i < kMost; ++i) {
-      std::uint32_t from = i;
-      while ((members >> from & 1u) == 0) from = (from + 1) % kMost;
-      places.source[i] = drawn.source[from];
-      places.x[i] = drawn.x[from];
-      places.y[i] = drawn.y[from];
-    }
-    return;
-  }
+void WavePoints::keepTo(std::size_t lane, const PartPoints& points, std::uint32_t seed) {
+  kept_[lane] = {points.numbers(), seed};
+  for (std::uint32_t& index : kept_[lane].reversedIndices) index = reverseBits(index);
 }
 
 /// The points that lie on one source; whether there are any.
@@ -291,12 +266,15 @@ void WavePoints::draw(const std::array<TexelSampler, kLanes>& samplers, std::uin
     Places& places = places_[lane];
     const std::span pieces = std::span(pieces_).subspan(firstPiece_[lane], firstPiece_[lane + 1] - firstPiece_[lane]);
     const std::uint32_t seed = samplers[lane].seedOf(pattern);
-    if (kept_[lane])
-      chooseOn(*kept_[lane], pieces, static_cast<float>(areas_[lane]), seed, reversedIndices, places);
-    else if (pieces.size() == 1 && pieces[0].isSquare)
+    if (const std::vector<std::uint32_t>& own = kept_[lane].reversedIndices; !own.empty()) {
+      alignas(64) std::uint32_t chosen[kMost];
+      for (std::uint32_t i = 0; i < kMost; ++i) chosen[i] = own[(seed + first + i) % own.size()];
+      choose(pieces, static_cast<float>(areas_[lane]), kept_[lane].seed, chosen, places);
+    } else if (pieces.size() == 1 && pieces[0].isSquare) {
       chooseInSquare(pieces[0], seed, reversedIndices, places);
-    else
+    } else {
       choose(pieces, static_cast<float>(areas_[lane]), seed, reversedIndices, places);
+    }
     for (std::uint32_t s = firstSource_[lane]; s < firstSource_[lane + 1]; ++s) {
       const Source& source = sources_[s];
       if (!locate(source, s, places, drawn_[lane]) || !turns_[lane]) continue;

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -50,8 +49,8 @@ class WavePoints {
   /// From the next draw on the lane is without a texel.
   void leaveOut(std::size_t lane);
 
-  /// From the next draw on the lane's points lie on one part of its texel. Keeps a reference to `parts`.
-  void keepTo(std::size_t lane, const TexelPart& part, const TexelParts& parts);
+  /// From the next draw on the lane's points are these of its texel, over and over.
+  void keepTo(std::size_t lane, const PartPoints& points, std::uint32_t seed);
 
   /// Draws samples [first, first + count) of a pattern, count <= kMost a power of two: point i of every texel is its
   /// sample first + i, uniform over the texel's covered area.
@@ -101,10 +100,10 @@ class WavePoints {
     float n[3][kMost];
     float ng[3][kMost];
   };
-  /// The part of a divided texel that its points lie on.
-  struct KeptPart {
-    TexelPart part;
-    const TexelParts* parts = nullptr;
+  /// The points of a divided texel.
+  struct KeptPoints {
+    std::vector<std::uint32_t> reversedIndices;  // empty: the texel is whole
+    std::uint32_t seed = 0;
   };
   struct SurfaceLanes {
     FrameLanes frame;
@@ -118,8 +117,6 @@ class WavePoints {
                              Places& places);
   static void choose(std::span<const Piece> pieces, float area, std::uint32_t seed,
                      const std::uint32_t* reversedIndices, Places& places);
-  void chooseOn(const KeptPart& kept, std::span<const Piece> pieces, float area, std::uint32_t seed,
-                const std::uint32_t* reversedIndices, Places& places) const;
   static bool locate(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
   static void turnToLanes(const Drawn* drawn, bool turning, Vec3Lanes* p, Vec3Lanes* rayStarts, SurfaceLanes* surfaces);
   static void locateFrames(const Source& source, std::uint32_t number, const Places& places, Drawn& drawn);
@@ -131,7 +128,7 @@ class WavePoints {
   std::vector<Piece> pieces_;                            // lane by lane
   std::array<std::uint32_t, kLanes + 1> firstSource_{};  // of each lane
   std::array<std::uint32_t, kLanes + 1> firstPiece_{};
-  std::array<std::optional<KeptPart>, kLanes> kept_;
+  std::array<KeptPoints, kLanes> kept_;
   std::array<bool, kLanes> turns_{};  // the frame is not the same all over the texel
   bool turning_ = false;              // any does
   std::uint32_t mask_ = 0;

@@ -7,7 +7,6 @@ WaveTexels::WaveTexels(const GatherScene& ofScene, std::uint32_t ofPage, std::si
       page(ofPage),
       first(firstTexel),
       count(texelCount),
-      parts(scene.transport.rays, scene.transport.materials, scene.atlas, scene.texels[page]),
       points(scene.transport.rays, scene.atlas, scene.texels[page], first, count) {
   for (std::size_t lane = 0; lane < count; ++lane) {
     const TexelCoord at = scene.texels[page].coords[first + lane];
@@ -17,7 +16,8 @@ WaveTexels::WaveTexels(const GatherScene& ofScene, std::uint32_t ofPage, std::si
   }
   const std::size_t start = scene.map.firstOfPage(page) + first;
   for (const DividedTexel& texel : scene.dividedAmong(start, count))
-    if (covered[texel.texel - start]) points.keepTo(texel.texel - start, texel.part, parts);
+    if (const std::size_t lane = texel.texel - start; covered[lane])
+      points.keepTo(lane, texel.points, samplers[lane].seedOf(kFootprint));
 }
 
 Flight WaveTexels::flightOf(std::size_t lane, std::uint32_t sample, const PointLanes& from,

@@ -10,7 +10,6 @@
 #include "baker/gather/waves/gather_tracer.h"
 #include "baker/gather/waves/wave_points.h"
 #include "baker/rays/sample_lanes.h"
-#include "baker/rays/texel_parts.h"
 
 namespace lumel {
 
@@ -36,7 +35,6 @@ struct WaveTexels {
   std::uint32_t page;
   std::size_t first;
   std::size_t count;
-  TexelParts parts;
   WavePoints points;
   std::array<TexelSampler, kLanes> samplers;
   std::array<bool, kLanes> covered{};
