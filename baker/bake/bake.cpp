@@ -14,6 +14,7 @@
 #include "baker/light/lit_scene.h"
 #include "baker/path/path_integrator.h"
 #include "baker/rays/flush_denormals.h"
+#include "baker/rays/texel_parts.h"
 #include "scene/base/check.h"
 #include "scene/base/parallel.h"
 #include "scene/base/stopwatch.h"
@@ -257,6 +258,31 @@ void storePathErrors(const Waves& waves, const std::vector<WaveMeans>& means, in
     }
 }
 
+/// Path-traced texels that see the backs of covers from the open are valid.
+void judgeCovers(const LightTransport& transport, const Atlas& atlas, const std::vector<PageTexels>& texels,
+                 std::vector<BakedPage>& pages, WaveStats& stats) {
+  // 2.8 standard deviations of a fair coin tell what lies in the open.
+  constexpr float kCertain = 8.0f;
+  for (std::size_t p = 0; p < pages.size(); ++p) {
+    std::vector<std::uint8_t> asked(texels[p].size()), seen(texels[p].size()), open(texels[p].size());
+    for (std::size_t i = 0; i < texels[p].size(); ++i) {
+      const float* aux = pages[p].aux.at(texels[p].coords[i].x, texels[p].coords[i].y);
+      const float lead = 2.0f * aux[1] - 1.0f;
+      asked[i] = aux[0] > 0.0f && lead < 0.0f ? 1 : 0;
+      seen[i] = aux[0] > 0.0f && lead > 0.0f && lead * lead * aux[3] >= kCertain ? 1 : 0;
+    }
+    if (std::ranges::count(asked, 1) == 0) continue;
+    TexelParts(transport.rays, transport.materials, atlas, texels[p]).findOpen(asked, seen, open);
+    for (std::size_t i = 0; i < texels[p].size(); ++i) {
+      if (asked[i] == 0 || open[i] == 0) continue;
+      const TexelCoord at = texels[p].coords[i];
+      pages[p].aux.at(at.x, at.y)[1] = 1.0f;
+      ++stats.validTexels;
+      stats.luminance += static_cast<double>(luminance(pages[p].flat.rgb(at.x, at.y)));
+    }
+  }
+}
+
 Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, const Atlas& atlas,
                                             const std::vector<PageTexels>& texels, const BakeOptions& options,
                                             std::vector<BakedPage>& pages, Progress& progress) {
@@ -299,6 +325,7 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
   });
   progress.end();
   if (progress.cancelled()) return interrupted();
+  judgeCovers(transport, atlas, texels, pages, waveStats.emplace_back());
   storePathErrors(waves, means, std::max(1, options.samples), texels, pages, waveStats);
   return waveStats;
 }

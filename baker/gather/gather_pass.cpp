@@ -51,14 +51,15 @@ void store(const GatherScene& scene, GatherState& state, std::size_t index, cons
     }
     if (!scene.levels.endless)
       for (std::size_t l = 0; l < scene.stored(); ++l) state.levelSums[t * scene.stored() + l] += Vec3(texel.levels[l]);
+    if ((wave.first + i) % kProbeStride == 0)
+      for (std::size_t k = 0; k < kProbeNormals; ++k)
+        state.probes[scene.waves.probeOf(wave.page, wave.first + i)][k] += Vec3(texel.probes[k]);
+    if (state.covers[t] == Cover::Open) continue;
     state.backFaces[t] += texel.backFaces;
     // The warm-up's rays and the first samples come from the same points.
     if (first == 0 && end >= kWarmRays && scene.levels.count > 0)
       state.inside[t].addPairs(state.warmBacks[t], texel.firstBacks);
     state.inside[t].add(texel.inside);
-    if ((wave.first + i) % kProbeStride == 0)
-      for (std::size_t k = 0; k < kProbeNormals; ++k)
-        state.probes[scene.waves.probeOf(wave.page, wave.first + i)][k] += Vec3(texel.probes[k]);
   }
   state.errors.add(scene.waves, index, before, now, first, end - first, leftOut);
   state.waves[index].samples = end;
@@ -120,7 +121,32 @@ std::vector<TexelMap::Substitute> substitutesFor(const GatherScene& scene, const
   return scene.map.substitutes(wanting, valid);
 }
 
+/// Judges texels most of whose rays met backs, each once: the backs of covers that are seen from the open do not count.
+static void judgeCovers(const GatherScene& scene, GatherState& state) {
+  parallelFor(scene.texels.size(), 1, [&](std::size_t firstPage, std::size_t lastPage) {
+    for (std::size_t p = firstPage; p < lastPage; ++p) {
+      const std::size_t start = scene.map.firstOfPage(p), count = scene.texels[p].size();
+      std::vector<std::uint8_t> asked(count), seen(count), open(count);
+      for (std::size_t i = 0; i < count; ++i) {
+        const double lead = 2.0 * state.backFaces[start + i] - state.samplesOf[start + i];
+        asked[i] = lead > 0.0 && state.covers[start + i] == Cover::Unknown ? 1 : 0;
+        seen[i] = lead < 0.0 && lead * lead >= kCertain * state.samplesOf[start + i] ? 1 : 0;
+      }
+      if (std::ranges::count(asked, 1) == 0) continue;
+      TexelParts(scene.transport.rays, scene.transport.materials, scene.atlas, scene.texels[p])
+          .findOpen(asked, seen, open);
+      for (std::size_t i = 0; i < count; ++i) {
+        if (asked[i] != 0) state.covers[start + i] = open[i] != 0 ? Cover::Open : Cover::Inside;
+        if (asked[i] == 0 || open[i] == 0) continue;
+        state.backFaces[start + i] = 0;
+        if (!state.inside.empty()) state.inside[start + i] = {};
+      }
+    }
+  });
+}
+
 void findBuried(const GatherScene& scene, GatherState& state) {
+  judgeCovers(scene, state);
   std::vector<std::uint8_t> hidden(scene.map.size());
   std::vector<std::uint8_t> valid(scene.map.size());
   for (std::size_t t = 0; t < valid.size(); ++t) {

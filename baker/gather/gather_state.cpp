@@ -20,7 +20,7 @@ constexpr float kMostInside = 0.6f;
 
 constexpr std::string_view kMagic = "lumel gather state\n";
 /// Grows with every change of what is written.
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 constexpr std::size_t kBlock = std::size_t{1} << 20;
 
 /// FNV-1a (Fowler, Noll, Vo) over words of eight bytes, the last filled up with zeros.
@@ -82,6 +82,7 @@ void visitMembers(State& s, Visit visit) {
   visit(s.inside);
   visit(s.samplesOf);
   visit(s.coverage);
+  visit(s.covers);
   visit(s.buried);
   visit(s.warmBacks);
   visit(s.reflectance);
@@ -168,6 +169,7 @@ GatherState::GatherState(const GatherScene& scene) : waves(scene.waves.size()), 
   const std::size_t count = scene.map.size();
   backFaces.resize(count);
   samplesOf.resize(count);
+  covers.resize(count);
   buried.resize(count);
   warmBacks.resize(count);
   if (scene.levels.count == 0) return;
@@ -205,10 +207,11 @@ bool GatherState::fits(const GatherScene& scene) const {
   const std::size_t summed = isWarm ? count : 0;
   const auto has = [](const auto& values, std::size_t wanted) { return values.size() == wanted; };
   bool fit = has(waves, scene.waves.size()) && has(errors.ofWaves, scene.waves.size()) && has(errors.squares, count) &&
-             has(errors.sums, count) && has(backFaces, count) && has(samplesOf, count) && has(buried, count) &&
-             (has(warmBacks, count) || (warmBacks.empty() && samples > 0)) && has(reflectance, cached) &&
-             has(direct, shining) && has(seen, shining) && has(sums.flat, summed) && has(coverage, summed) &&
-             has(inside, summed) && has(probes, isWarm ? scene.waves.probes() : 0) && has(uneven, isWarm ? cached : 0);
+             has(errors.sums, count) && has(backFaces, count) && has(samplesOf, count) && has(covers, count) &&
+             has(buried, count) && (has(warmBacks, count) || (warmBacks.empty() && samples > 0)) &&
+             has(reflectance, cached) && has(direct, shining) && has(seen, shining) && has(sums.flat, summed) &&
+             has(coverage, summed) && has(inside, summed) && has(probes, isWarm ? scene.waves.probes() : 0) &&
+             has(uneven, isWarm ? cached : 0);
   fit = fit && has(sums.maps, isWarm ? scene.encoding.mapCount() : 0);
   for (const std::vector<Vec3>& map : sums.maps) fit = fit && has(map, summed);
   const std::size_t sources = scene.strategies.empty() ? 0 : scene.strategies.size() + 1;

@@ -40,6 +40,9 @@ struct TexelLight {
   void resize(std::size_t count, std::size_t mapCount);
 };
 
+/// Whether a texel that sees backs lies inside of something. In the open they count as what they are, surfaces.
+enum class Cover : std::uint8_t { Unknown, Inside, Open };
+
 struct GatherState {
   struct OfWave {
     std::uint32_t samples = 0;  // it has taken [0, samples) of each of its texels
@@ -71,6 +74,7 @@ struct GatherState {
   std::vector<InsideTally> inside;
   std::vector<std::uint32_t> samplesOf;
   std::vector<float> coverage;
+  std::vector<Cover> covers;            // of texels most of whose rays met backs
   std::vector<std::uint8_t> buried;     // 1: nothing more is gathered for the texel
   std::vector<std::uint8_t> warmBacks;  // bits of the warm-up's rays that met backs; empty once the first pass is done
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <unordered_map>
 
 #include "baker/rays/sampling.h"
 #include "scene/base/sobol.h"
@@ -21,6 +22,8 @@ constexpr float kDrawnIn = 1.0f / 256.0f;
 /// Points that are drawn of a texel that may be divided, beside its corners.
 constexpr std::uint32_t kDrawn = 16;
 constexpr std::size_t kMostCorners = 8;
+/// What lies on a surface is looked for from this share of the lift upwards, which rounding does not reach (liftOf).
+constexpr float kRising = 1.0f / 16.0f;
 /// Rays that tell how far a part lies inside of something.
 constexpr int kOpennessRays = kLanes;
 
@@ -42,6 +45,11 @@ class SightTest {
     const Vec3 over = 0.5f * (a.p + b.p) + sum * ((lift + rise) / length);
     trace(question, from, over);
     trace(question, over, to);
+  }
+
+  /// Asks whether nothing lies on the surface at a point, lower than `lift`.
+  void askUpwards(std::uint32_t question, const SurfaceSpot& spot, float lift) {
+    trace(question, spot.p + kRising * lift * spot.ng, spot.p + lift * spot.ng);
   }
 
   /// Bits of the questions whose two do not see each other.
@@ -270,12 +278,70 @@ std::optional<PartPoints> TexelParts::pointsOf(std::size_t texel, std::uint32_t 
   return points;
 }
 
+std::uint32_t TexelParts::chartOf(std::size_t texel) const {
+  const TriangleRef& ref = page_.trianglesOf(texel).front();
+  return atlas_.surfaces[ref.surface].charts[ref.triangle];
+}
+
+TexelParts::Stand TexelParts::standOf(std::uint32_t texel) const {
+  Stand stand;
+  TexelFootprint footprint;
+  if (!(footprint.clip(atlas_, page_, texel) > 0.0)) return stand;
+  stand.spot = spotOf(footprint.centroid());
+  stand.lift = liftOf(footprint, atlas_, rays_);
+  if (suspects({&texel, 1}) != 0)
+    if (const std::optional<TexelPart> part = find(texel)) stand.spot = part->spots[0];
+  SightTest sight(rays_, materials_);
+  sight.askUpwards(0, stand.spot, stand.lift);
+  stand.isFree = sight.blocked() == 0;
+  return stand;
+}
+
+void TexelParts::findOpen(std::span<const std::uint8_t> asked, std::span<const std::uint8_t> seen,
+                          std::span<std::uint8_t> open) const {
+  constexpr std::array<std::array<int, 2>, 4> kBeside = {{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+  std::unordered_map<std::uint32_t, Stand> stands;
+  const auto standAt = [&](std::uint32_t texel) -> const Stand& {
+    const auto [at, isNew] = stands.try_emplace(texel);
+    if (isNew) at->second = standOf(texel);
+    return at->second;
+  };
+  std::vector<std::uint8_t> reached(page_.size(), 0);
+  for (std::uint32_t start = 0; start < page_.size(); ++start) {
+    if (asked[start] == 0 || reached[start] != 0) continue;
+    std::vector<std::uint32_t> way = {start};
+    reached[start] = 1;
+    bool isOpen = false;
+    for (std::size_t next = 0; next < way.size() && !isOpen; ++next) {
+      const Stand from = standAt(way[next]);
+      if (!from.isFree) continue;
+      const TexelCoord at = page_.coords[way[next]];
+      SightTest sight(rays_, materials_);
+      std::array<std::optional<std::size_t>, kBeside.size()> beside;
+      for (std::uint32_t k = 0; k < kBeside.size(); ++k) {
+        beside[k] = texelAt(at.x + kBeside[k][0], at.y + kBeside[k][1]);
+        if (!beside[k] || chartOf(*beside[k]) != chartOf(way[next])) beside[k].reset();
+        // Who was reached before and is not open cannot be seen from here, or this texel would have been reached then.
+        if (!beside[k] || (reached[*beside[k]] != 0 && open[*beside[k]] == 0)) continue;
+        sight.ask(k, from.spot, standAt(static_cast<std::uint32_t>(*beside[k])).spot, from.lift);
+      }
+      const std::uint32_t blocked = sight.blocked();
+      for (std::uint32_t k = 0; k < kBeside.size(); ++k) {
+        if (!beside[k] || (blocked >> k & 1u) != 0) continue;
+        const auto texel = static_cast<std::uint32_t>(*beside[k]);
+        if (!standAt(texel).isFree) continue;
+        isOpen = isOpen || seen[texel] != 0 || open[texel] != 0;
+        if (reached[texel] == 0) way.push_back(texel);
+        reached[texel] = 1;
+      }
+    }
+    if (isOpen)
+      for (const std::uint32_t texel : way) open[texel] = 1;
+  }
+}
+
 /// The middles of the up to eight texels around that belong to the same chart.
 std::vector<SurfaceSpot> TexelParts::neighboursOf(std::size_t texel) const {
-  const auto chartOf = [&](std::size_t t) {
-    const TriangleRef& ref = page_.trianglesOf(t).front();
-    return atlas_.surfaces[ref.surface].charts[ref.triangle];
-  };
   std::vector<SurfaceSpot> spots;
   TexelFootprint footprint;
   const TexelCoord at = page_.coords[texel];

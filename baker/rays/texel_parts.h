@@ -67,7 +67,22 @@ class TexelParts {
   /// it.
   std::optional<PartPoints> pointsOf(std::size_t texel, std::uint32_t seed) const;
 
+  /// Tells texels that lie in the open beneath a cover without an underside, whose backs they see, from those inside of
+  /// things. Of the texels that are `asked` (one entry for each texel of the page), those become `open` from which a
+  /// way leads to one that is `seen` to lie in the open: from neighbour to neighbour of a chart, each in free sight of
+  /// the one before it. A texel under something that lies lower than points look at each other is not open.
+  void findOpen(std::span<const std::uint8_t> asked, std::span<const std::uint8_t> seen,
+                std::span<std::uint8_t> open) const;
+
  private:
+  /// What stands for a texel when neighbours look at each other.
+  struct Stand {
+    SurfaceSpot spot;
+    float lift = 0.0f;
+    bool isFree = false;  // nothing lies on the surface there
+  };
+  Stand standOf(std::uint32_t texel) const;
+  std::uint32_t chartOf(std::size_t texel) const;
   std::vector<SurfaceSpot> neighboursOf(std::size_t texel) const;
   std::optional<std::size_t> texelAt(int x, int y) const;
   double openness(const SurfaceSpot& spot, float lift) const;

@@ -79,11 +79,13 @@ TEST(TexelParts, WhatCanBeWalkedRoundDividesNothing) {
     EXPECT_EQ(page.find(texel).has_value(), texel == parts.texel(2, 2)) << texel;
 }
 
-TEST(TexelParts, WhatIsCutOutDividesNothing) {
+TEST(TexelParts, WhatLetsLightThroughDividesNothing) {
   TestScene test = floorAlone();
-  const int leaves = test.addMaterial(Vec3(0.5f));
-  test.scene.materials[static_cast<std::size_t>(leaves)].alphaMode = AlphaMode::Mask;
-  test.addRectangle({0.1f, 0, 2}, {0, 0, -4}, {0, 1, 0}, {.material = leaves, .texels = 0});
+  const int pane = test.addMaterial(Vec3(0.5f));
+  Material& material = test.scene.materials[static_cast<std::size_t>(pane)];
+  material.alphaMode = AlphaMode::Blend;
+  material.baseColor.w = 0.9f;
+  test.addRectangle({0.1f, 0, 2}, {0, 0, -4}, {0, 1, 0}, {.material = pane, .texels = 0});
   const Parts parts(test);
   EXPECT_FALSE(parts.ofPage(0).find(parts.texel(2, 1)));
 }
