@@ -54,12 +54,7 @@ void store(const GatherScene& scene, GatherState& state, std::size_t index, cons
     if ((wave.first + i) % kProbeStride == 0)
       for (std::size_t k = 0; k < kProbeNormals; ++k)
         state.probes[scene.waves.probeOf(wave.page, wave.first + i)][k] += Vec3(texel.probes[k]);
-    if (state.covers[t] == Cover::Open) continue;
-    state.backFaces[t] += texel.backFaces;
-    // The warm-up's rays and the first samples come from the same points.
-    if (first == 0 && end >= kWarmRays && scene.levels.count > 0)
-      state.inside[t].addPairs(state.warmBacks[t], texel.firstBacks);
-    state.inside[t].add(texel.inside);
+    if (state.covers[t] != Cover::Open) state.backFaces[t] += texel.backFaces;
   }
   state.errors.add(scene.waves, index, before, now, first, end - first, leftOut);
   state.waves[index].samples = end;
@@ -97,7 +92,6 @@ Expected<void> gatherPass(const GatherScene& scene, GatherState& state, std::siz
 }
 
 void closePass(const GatherScene& scene, GatherState& state) {
-  if (state.samples == 0) state.warmBacks = std::vector<std::uint8_t>();
   state.samples = state.openEnd;
   state.openEnd = 0;
   std::stable_sort(state.nonFinite.begin() + static_cast<std::ptrdiff_t>(state.closedNonFinite), state.nonFinite.end(),
@@ -137,9 +131,7 @@ static void judgeCovers(const GatherScene& scene, GatherState& state) {
           .findOpen(asked, seen, open);
       for (std::size_t i = 0; i < count; ++i) {
         if (asked[i] != 0) state.covers[start + i] = open[i] != 0 ? Cover::Open : Cover::Inside;
-        if (asked[i] == 0 || open[i] == 0) continue;
-        state.backFaces[start + i] = 0;
-        if (!state.inside.empty()) state.inside[start + i] = {};
+        if (asked[i] != 0 && open[i] != 0) state.backFaces[start + i] = 0;
       }
     }
   });

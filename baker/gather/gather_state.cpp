@@ -14,9 +14,6 @@ namespace {
 
 /// Calibrated: 93 to 97% of texels lie within 1.96 standard errors.
 constexpr double kGatherCredit = 0.5;
-/// A texel more of which sees nothing but backs is invalid. Where its chart has no better ones it may be in a room that
-/// is inside out, and all that it found counts.
-constexpr float kMostInside = 0.6f;
 
 constexpr std::string_view kMagic = "lumel gather state\n";
 /// Grows with every change of what is written.
@@ -79,12 +76,10 @@ void visitMembers(State& s, Visit visit) {
   visit(s.levelSums);
   visit(s.probes);
   visit(s.backFaces);
-  visit(s.inside);
   visit(s.samplesOf);
   visit(s.coverage);
   visit(s.covers);
   visit(s.buried);
-  visit(s.warmBacks);
   visit(s.reflectance);
   visit(s.radiance);
   visit(s.uneven);
@@ -171,7 +166,6 @@ GatherState::GatherState(const GatherScene& scene) : waves(scene.waves.size()), 
   samplesOf.resize(count);
   covers.resize(count);
   buried.resize(count);
-  warmBacks.resize(count);
   if (scene.levels.count == 0) return;
   reflectance.resize(count);
   if (!scene.levels.endless) radiance.resize(count * scene.stored());  // else it is what the warm-up ends with
@@ -184,7 +178,6 @@ void GatherState::makeSums(const GatherScene& scene) {
   const std::size_t count = scene.map.size();
   sums.resize(count, scene.encoding.mapCount());
   coverage.resize(count);
-  inside.resize(count);
   if (!scene.levels.endless) levelSums.resize(count * scene.stored());
   probes.resize(scene.waves.probes());
   if (!scene.strategies.empty()) spreads.resize(scene.waves.size() * (scene.strategies.size() + 1));
@@ -208,9 +201,8 @@ bool GatherState::fits(const GatherScene& scene) const {
   const auto has = [](const auto& values, std::size_t wanted) { return values.size() == wanted; };
   bool fit = has(waves, scene.waves.size()) && has(errors.ofWaves, scene.waves.size()) && has(errors.squares, count) &&
              has(errors.sums, count) && has(backFaces, count) && has(samplesOf, count) && has(covers, count) &&
-             has(buried, count) && (has(warmBacks, count) || (warmBacks.empty() && samples > 0)) &&
-             has(reflectance, cached) && has(direct, shining) && has(seen, shining) && has(sums.flat, summed) &&
-             has(coverage, summed) && has(inside, summed) && has(probes, isWarm ? scene.waves.probes() : 0) &&
+             has(buried, count) && has(reflectance, cached) && has(direct, shining) && has(seen, shining) &&
+             has(sums.flat, summed) && has(coverage, summed) && has(probes, isWarm ? scene.waves.probes() : 0) &&
              has(uneven, isWarm ? cached : 0);
   fit = fit && has(sums.maps, isWarm ? scene.encoding.mapCount() : 0);
   for (const std::vector<Vec3>& map : sums.maps) fit = fit && has(map, summed);
@@ -234,12 +226,6 @@ std::span<LightSpread> GatherState::spreadsOf(const GatherScene& scene, std::siz
   return std::span(spreads).subspan(wave * sources, sources);
 }
 
-float GatherState::weightOf(std::size_t texel) const {
-  const auto taken = static_cast<float>(std::max(1u, samplesOf[texel]));
-  const float lost = inside[texel].share() * static_cast<float>(backFaces[texel]);
-  return lost > kMostInside * taken ? taken : taken - lost;
-}
-
 double GatherState::meanLuminance(double share) const {
   double total = 0.0;
   for (std::size_t t = 0; t < sums.flat.size(); ++t) total += static_cast<double>(luminance(meanLight(t)));
@@ -247,8 +233,7 @@ double GatherState::meanLuminance(double share) const {
 }
 
 float GatherState::errorOf(const Waves& all, std::size_t wave, std::size_t i) const {
-  const std::size_t t = all[wave].start + i;
-  return errors.standardError(all, wave, i) * static_cast<float>(samplesOf[t]) / weightOf(t);
+  return errors.standardError(all, wave, i);
 }
 
 std::uint64_t gatherKey(const GatherScene& scene, const GatherOptions& options) {

@@ -2,6 +2,7 @@
 // on, in the middle of a pass too, and gathering goes on from what was read with the same result, bit for bit.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -11,7 +12,6 @@
 
 #include "baker/gather/doubling_error.h"
 #include "baker/gather/waves/gather_scene.h"
-#include "baker/gather/waves/inside_points.h"
 #include "baker/gather/waves/light_effort.h"
 #include "baker/gather/waves/packed_color.h"
 #include "baker/rays/non_finite.h"
@@ -71,12 +71,10 @@ struct GatherState {
   std::vector<Vec3> levelSums;                          // levels.count per texel, unless endless
   std::vector<std::array<Vec3, kProbeNormals>> probes;  // of Waves::probes
   std::vector<std::uint32_t> backFaces;                 // rays that met backs
-  std::vector<InsideTally> inside;
   std::vector<std::uint32_t> samplesOf;
   std::vector<float> coverage;
-  std::vector<Cover> covers;            // of texels most of whose rays met backs
-  std::vector<std::uint8_t> buried;     // 1: nothing more is gathered for the texel
-  std::vector<std::uint8_t> warmBacks;  // bits of the warm-up's rays that met backs; empty once the first pass is done
+  std::vector<Cover> covers;         // of texels most of whose rays met backs
+  std::vector<std::uint8_t> buried;  // 1: nothing more is gathered for the texel
 
   // The cache, per texel:
   std::vector<PackedColor> reflectance;
@@ -103,8 +101,8 @@ struct GatherState {
   std::uint64_t samplesTaken(const GatherScene& scene) const;
 
   std::span<LightSpread> spreadsOf(const GatherScene& scene, std::size_t wave);
-  /// Samples of a texel that count: those from points in the open.
-  float weightOf(std::size_t texel) const;
+  /// Samples of a texel, at least 1.
+  float weightOf(std::size_t texel) const { return static_cast<float>(std::max(1u, samplesOf[texel])); }
   /// Irradiance / pi of the flat map.
   Vec3 meanLight(std::size_t texel) const { return sums.flat[texel] / weightOf(texel); }
   /// `share` of the mean luminance over all texels; 0 before there are samples.

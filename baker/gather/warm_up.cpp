@@ -167,7 +167,6 @@ Expected<void> warmUp(const GatherScene& scene, GatherState& state, Progress& pr
       state.reflectance[t] = packColor(warm[i].reflectance);
       first[t] = warm[i].direct + warm[i].seen;
       constant[t] = first[t] + warm[i].relit;
-      state.warmBacks[t] = static_cast<std::uint8_t>(warm[i].backs);
       state.backFaces[t] = static_cast<std::uint32_t>(std::popcount(warm[i].backs));
       state.uneven[t] = warm[i].isUneven() ? 1 : 0;
       if (!scene.indirectOnly) continue;

@@ -22,8 +22,10 @@ constexpr float kDrawnIn = 1.0f / 256.0f;
 /// Points that are drawn of a texel that may be divided, beside its corners.
 constexpr std::uint32_t kDrawn = 16;
 constexpr std::size_t kMostCorners = 8;
+/// And so far from the corners, since in sharp creases the way up from a corner leads into the other side.
+constexpr float kFromCorner = 1.0f / 16.0f;
 /// What lies on a surface is looked for from this share of the lift upwards, which rounding does not reach (liftOf).
-constexpr float kRising = 1.0f / 16.0f;
+constexpr float kRising = 1.0f / 64.0f;
 /// Rays that tell how far a part lies inside of something.
 constexpr int kOpennessRays = kLanes;
 
@@ -170,13 +172,17 @@ void addDrawn(const TexelFootprint& footprint, std::vector<SurfaceSpot>& spots) 
   }
 }
 
+/// Steps to the texels beside one.
+constexpr std::array<std::array<int, 2>, 4> kBeside = {{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+constexpr std::uint32_t kNoPart = 0xffffffffu;
+
 /// Points that see each other, by way of others too, are one part: for each the number of its part's first point. From
 /// each point that was reached those are asked that were not yet, so that a whole texel takes one round.
-/// Precondition: at most 32 spots.
-std::vector<std::uint32_t> partsOf(std::span<const SurfaceSpot> spots, float lift, const RayScene& rays,
-                                   const Materials& materials) {
-  std::vector<std::uint32_t> part(spots.size());
-  std::uint32_t unknown = static_cast<std::uint32_t>((std::uint64_t{1} << spots.size()) - 1u);
+/// Those that something lies on are no part of anything: kNoPart. Precondition: at most 31 spots.
+std::vector<std::uint32_t> partsOf(std::span<const SurfaceSpot> spots, std::uint32_t covered, float lift,
+                                   const RayScene& rays, const Materials& materials) {
+  std::vector<std::uint32_t> part(spots.size(), kNoPart);
+  std::uint32_t unknown = ((1u << spots.size()) - 1u) & ~covered;
   while (unknown != 0) {
     const auto first = static_cast<std::uint32_t>(std::countr_zero(unknown));
     std::uint32_t waiting = 1u << first;
@@ -206,7 +212,10 @@ std::uint32_t TexelParts::suspects(std::span<const std::uint32_t> texels) const 
     if (!(footprint.clip(atlas_, page_, texels[i]) > 0.0)) continue;
     const SurfaceSpot middle = spotOf(footprint.centroid());
     const float lift = liftOf(footprint, atlas_, rays_);
-    for (const SurfaceSpot& corner : cornersOf(footprint, middle)) sight.ask(i, middle, corner, lift);
+    for (const SurfaceSpot& corner : cornersOf(footprint, middle)) {
+      sight.ask(i, middle, corner, lift);
+      sight.askUpwards(i, {corner.p + kFromCorner * (middle.p - corner.p), corner.ng}, lift);
+    }
   }
   return sight.blocked();
 }
@@ -221,43 +230,56 @@ std::optional<TexelPart> TexelParts::find(std::size_t texel) const {
   addDrawn(footprint, spots);
 
   const std::size_t count = spots.size();
-  const std::vector<std::uint32_t> parent = partsOf(spots, lift, rays_, materials_);
+  SightTest upwards(rays_, materials_);
+  for (std::size_t i = corners; i < count; ++i) upwards.askUpwards(static_cast<std::uint32_t>(i), spots[i], lift);
+  const std::vector<std::uint32_t> parent = partsOf(spots, upwards.blocked(), lift, rays_, materials_);
   if (std::ranges::count(parent, 0u) == static_cast<std::ptrdiff_t>(count)) return std::nullopt;
 
-  const std::vector<SurfaceSpot> neighbours = neighboursOf(texel);
-  std::optional<TexelPart> best;
-  double bestScore = 0.0;
+  struct Candidate {
+    TexelPart part;
+    double score = 0.0;
+  };
+  std::vector<Candidate> candidates;
   for (std::size_t root = 0; root < count; ++root) {
     if (parent[root] != root) continue;
-    TexelPart part;
-    part.lift = lift;
-    double score = 0.0;
+    Candidate& candidate = candidates.emplace_back();
+    candidate.part.lift = lift;
     // Drawn points first: they lie amid their part, corners at its rim.
     for (std::size_t i = count; i-- > 0;) {
       if (parent[i] != root) continue;
-      if (part.count < TexelPart::kMostSpots) part.spots[part.count++] = spots[i];
-      score += i >= corners ? 1.0 / kDrawn : 0.0;
+      if (candidate.part.count < TexelPart::kMostSpots) candidate.part.spots[candidate.part.count++] = spots[i];
+      candidate.score += i >= corners ? 1.0 / kDrawn : 0.0;
     }
-    for (std::size_t first = 0; first < neighbours.size(); first += kLanes)
-      score += std::popcount(members(
-          part, std::span(neighbours).subspan(first, std::min<std::size_t>(kLanes, neighbours.size() - first))));
-    score *= openness(part.spots[0], lift);
-    if (best && score <= bestScore) continue;
-    best = part;
+  }
+  if (candidates.empty()) return std::nullopt;
+  if (candidates.size() == 1) return candidates[0].part;
+  const std::vector<SurfaceSpot> neighbours = neighboursOf(texel);
+  for (Candidate& candidate : candidates) candidate.score += std::popcount(members(candidate.part, neighbours));
+  std::ranges::stable_sort(candidates, std::ranges::greater(), &Candidate::score);
+  const Candidate* best = nullptr;
+  double bestScore = 0.0;
+  for (const Candidate& candidate : candidates) {
+    if (best != nullptr && candidate.score <= bestScore) break;
+    const double score = candidate.score * openness(candidate.part.spots[0], lift);
+    if (best != nullptr && score <= bestScore) continue;
+    best = &candidate;
     bestScore = score;
   }
-  return best;
+  return best->part;
 }
 
 std::uint32_t TexelParts::members(const TexelPart& part, std::span<const SurfaceSpot> spots) const {
-  std::uint32_t others = (1u << spots.size()) - 1u;
+  SightTest upwards(rays_, materials_);
+  for (std::uint32_t i = 0; i < spots.size(); ++i) upwards.askUpwards(i, spots[i], part.lift);
+  const std::uint32_t free = ((1u << spots.size()) - 1u) & ~upwards.blocked();
+  std::uint32_t others = free;
   for (std::size_t k = 0; k < part.count && others != 0; ++k) {
     SightTest sight(rays_, materials_);
     forEachLane(others,
                 [&](std::size_t i) { sight.ask(static_cast<std::uint32_t>(i), part.spots[k], spots[i], part.lift); });
     others &= sight.blocked();
   }
-  return ((1u << spots.size()) - 1u) & ~others;
+  return free & ~others;
 }
 
 std::optional<PartPoints> TexelParts::pointsOf(std::size_t texel, std::uint32_t seed) const {
@@ -266,15 +288,13 @@ std::optional<PartPoints> TexelParts::pointsOf(std::size_t texel, std::uint32_t 
   TexelFootprint footprint;
   footprint.clip(atlas_, page_, texel);
   PartPoints points;
-  std::uint32_t any = 0;
   for (std::uint32_t first = 0; first < PartPoints::kDrawn; first += kLanes) {
     std::array<SurfaceSpot, kLanes> spots;
     for (std::uint32_t i = 0; i < kLanes; ++i) spots[i] = spotOf(footprint.sample(sobol2D(first + i, seed)));
     const std::uint32_t seen = members(*part, spots);
-    points.bits[first / 32] |= seen << first % 32;
-    any |= seen;
+    points.bits |= std::uint64_t{seen} << first;
   }
-  if (any == 0) return std::nullopt;
+  if (points.bits == 0) return std::nullopt;
   return points;
 }
 
@@ -299,7 +319,6 @@ TexelParts::Stand TexelParts::standOf(std::uint32_t texel) const {
 
 void TexelParts::findOpen(std::span<const std::uint8_t> asked, std::span<const std::uint8_t> seen,
                           std::span<std::uint8_t> open) const {
-  constexpr std::array<std::array<int, 2>, 4> kBeside = {{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
   std::unordered_map<std::uint32_t, Stand> stands;
   const auto standAt = [&](std::uint32_t texel) -> const Stand& {
     const auto [at, isNew] = stands.try_emplace(texel);
@@ -340,18 +359,16 @@ void TexelParts::findOpen(std::span<const std::uint8_t> asked, std::span<const s
   }
 }
 
-/// The middles of the up to eight texels around that belong to the same chart.
+/// The middles of the up to four texels beside one that belong to the same chart.
 std::vector<SurfaceSpot> TexelParts::neighboursOf(std::size_t texel) const {
   std::vector<SurfaceSpot> spots;
   TexelFootprint footprint;
   const TexelCoord at = page_.coords[texel];
-  for (int dy = -1; dy <= 1; ++dy)
-    for (int dx = -1; dx <= 1; ++dx) {
-      if (dx == 0 && dy == 0) continue;
-      const auto near = texelAt(at.x + dx, at.y + dy);
-      if (near && chartOf(*near) == chartOf(texel) && footprint.clip(atlas_, page_, *near) > 0.0)
-        spots.push_back(spotOf(footprint.centroid()));
-    }
+  for (const auto& [dx, dy] : kBeside) {
+    const auto near = texelAt(at.x + dx, at.y + dy);
+    if (near && chartOf(*near) == chartOf(texel) && footprint.clip(atlas_, page_, *near) > 0.0)
+      spots.push_back(spotOf(footprint.centroid()));
+  }
   return spots;
 }
 

@@ -32,20 +32,21 @@ struct TexelPart {
 /// footprint, TexelFootprint::sample(sobol2D(i, seed)), bit i tells that point i does. They are found once, since each
 /// takes rays.
 struct PartPoints {
-  static constexpr std::uint32_t kDrawn = 128;
-  std::array<std::uint32_t, kDrawn / 32> bits{};
+  static constexpr std::uint32_t kDrawn = 64;
+  std::uint64_t bits = 0;
 
   /// Numbers of the points.
   std::vector<std::uint32_t> numbers() const {
     std::vector<std::uint32_t> all;
     for (std::uint32_t i = 0; i < kDrawn; ++i)
-      if ((bits[i / 32] >> i % 32 & 1u) != 0) all.push_back(i);
+      if ((bits >> i & 1u) != 0) all.push_back(i);
     return all;
   }
 };
 
 /// Finds the parts of a page's texels. Sight is tested by short rays a twentieth of a texel above the surface: what is
-/// lower divides nothing, and neither does what is cut out or see-through (leaves, nets, panes).
+/// lower divides nothing, and neither does what is cut out or see-through (leaves, nets, panes). What lies on the
+/// surface so low covers it: covered points belong to no part, unless all are.
 class TexelParts {
  public:
   /// Keeps references to its arguments.
@@ -63,8 +64,7 @@ class TexelParts {
   /// Bit i: spots[i] sees the part. Precondition: at most kLanes spots.
   std::uint32_t members(const TexelPart& part, std::span<const SurfaceSpot> spots) const;
 
-  /// The points of a texel that is divided; nothing where it is whole, or where what counts is less than a hundredth of
-  /// it.
+  /// The points of a texel that is divided; nothing where it is whole, or where none of them counts.
   std::optional<PartPoints> pointsOf(std::size_t texel, std::uint32_t seed) const;
 
   /// Tells texels that lie in the open beneath a cover without an underside, whose backs they see, from those inside of

@@ -1,18 +1,6 @@
 #include "baker/gather/waves/gather_sink.h"
 
-#include <algorithm>
-
 namespace lumel {
-
-void GatherSink::judgePoints(const NetRange& net) {
-  const std::uint32_t each = net.count() / WavePoints::kMost;
-  for (std::size_t lane = 0; lane < coords.size(); ++lane) {
-    if (each >= 2) result.texels[lane].inside.addNet(backs[lane], each);
-    for (std::uint32_t i = net.first; i < std::min(net.first + net.count(), std::uint32_t{kWarmRays}); ++i)
-      result.texels[lane].firstBacks |= std::uint32_t{backs[lane][i - net.first]} << i;
-  }
-  backs = {};
-}
 
 void GatherSink::finish() {
   settle(sums, maps, totals);

@@ -10,7 +10,6 @@
 #include "baker/gather/waves/gather_kernels.h"
 #include "baker/gather/waves/gather_scene.h"
 #include "baker/gather/waves/gather_tracer.h"
-#include "baker/gather/waves/inside_points.h"
 #include "baker/gather/waves/light_effort.h"
 #include "baker/gather/waves/wave_points.h"
 #include "baker/rays/non_finite.h"
@@ -26,9 +25,7 @@ struct GatheredTexel {
   std::array<Vec3d, CacheLevels::kMost> levels{};  // flat light of the cache's levels, unless endless
   std::array<Vec3d, kProbeNormals> probes{};       // where the texel is probed
   Vec3d seen{0};  // with GatherScene::indirectOnly: flat light from what rays see shine by itself, not in the maps
-  std::uint32_t backFaces = 0;   // rays that met backs
-  std::uint32_t firstBacks = 0;  // bits of the first kWarmRays samples, each from a point of its own
-  InsideTally inside;            // of nets with two rays and more from each point
+  std::uint32_t backFaces = 0;  // rays that met backs
 };
 
 struct GatheredWave {
@@ -51,8 +48,6 @@ struct GatherSink {
   MapTotals totals{};
   bool tallied = false;  // whether the gather rays are
   LightTally rays{};
-  std::size_t point = 0;  // the footprint point that the ray at hand comes from
-  std::array<std::array<std::uint8_t, WavePoints::kMost>, kLanes> backs{};  // rays of a net that met backs, by point
 
   /// Radiance that a texel reflects, by level.
   const PackedColor* reflectedBy(std::uint32_t texel) const {
@@ -129,13 +124,8 @@ struct GatherSink {
     }
     passOnLevels(flight.lane, flight.dirTangent, flight.beta, texel, flight.depth);
   }
-  void backFace(const Flight& flight) {
-    ++result.texels[flight.lane].backFaces;
-    ++backs[flight.lane][point];
-  }
+  void backFace(const Flight& flight) { ++result.texels[flight.lane].backFaces; }
 
-  /// Ends a net: tells by its rays which footprint points are inside of something.
-  void judgePoints(const NetRange& net);
   /// Hands the sums over to the result.
   void finish();
 };

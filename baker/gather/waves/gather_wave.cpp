@@ -144,7 +144,6 @@ void GatherWave::gatherRays(const NetRange& net, GatherTracer<GatherSink>& trace
     if (inFlight(1)) expectSpots(packet(1), tracer);
     if (inFlight(2)) expectLight(packet(2), tracer, sink);
   }
-  sink.judgePoints(net);
   settle(sink.sums, sink.maps, sink.totals);
 }
 
@@ -189,7 +188,6 @@ void GatherWave::collect(const Packet& packet, GatherTracer<GatherSink>& tracer,
   forEachLane(found.others, [&](std::size_t lane) {
     const Flight flight =
         wave_.flightOf(lane, net_.sample(packet.cell, lane), wave_.points[pointOf(packet.cell)], rays);
-    sink.point = pointOf(packet.cell) % WavePoints::kMost;
     tracer.arrive(rays.packet, static_cast<int>(lane), flight, lookup);
   });
   if (found.missed != 0 && wave_.scene.transport.environment.shines()) collectSky(rays, found.missed, light, sink);
