@@ -16,9 +16,10 @@ Receiver receiverAt(const RayScene& rays, const Atlas& atlas, const SurfacePoint
   Receiver receiver{point.position, point.geometricNormal, point.frame.n,
                     offsetPoint(point.position, point.geometricNormal, corners, translation)};
   const Vec3 e1 = corners[1] - corners[0], e2 = corners[2] - corners[0];
-  if (!isRounded(receiver.ng, e1, e2, normals)) return receiver;
+  const float rounded = roundedShare(receiver.ng, e1, e2, normals);
+  if (!(rounded > 0.0f)) return receiver;
   const Vec3 lift =
-      liftToRound(point.position - corners[0], e1, e2, {point.barycentric.y, point.barycentric.z}, normals);
+      rounded * liftToRound(point.position - corners[0], e1, e2, {point.barycentric.y, point.barycentric.z}, normals);
   if (!isLifted(lift, receiver.ng, offsetDistance(corners, translation))) return receiver;
   receiver.rayStart += lift;
   receiver.ng = receiver.ns;

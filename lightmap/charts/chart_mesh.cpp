@@ -205,6 +205,11 @@ void alignToAxes(const ChartMesh& chart, std::vector<Vec2d>& uvs) {
 namespace {
 
 /// Triangles of a flattened chart in square cells, for pairs that may meet.
+///
+/// Of slivers every one meets most others of its cells, so what is known without a look at pairs is used: the triangles
+/// around one vertex lie apart if none is turned over and their angles add up to a turn at most. Those of vertices
+/// where many meet (hubs: caps of cylinders) are not compared with each other. Cells with many others are swept across
+/// their triangles' common direction, by which long parallel ones come apart.
 class OverlapGrid {
  public:
   OverlapGrid(const ChartMesh& chart, std::span<const Vec2d> uvs) : chart_(chart), uvs_(uvs) {
@@ -215,23 +220,119 @@ class OverlapGrid {
       high = glm::max(high, uv);
     }
     const Vec2d size = glm::max(high - low_, Vec2d(1e-9));
-    // About one triangle per cell; long thin charts still get square cells.
-    cell_ = std::max(std::sqrt(size.x * size.y / static_cast<double>(chart.size())), std::max(size.x, size.y) / 4096);
+    // About one triangle per cell; long thin charts still get square cells. Slivers lie in kMostCells on average.
+    double longest = 0;
+    for (std::uint32_t t = 0; t < chart.size(); ++t) longest += glm::length(longestEdge(t));
+    const auto count = static_cast<double>(chart.size());
+    cell_ =
+        std::max({std::sqrt(size.x * size.y / count), std::max(size.x, size.y) / 4096, longest / (count * kMostCells)});
     width_ = static_cast<std::size_t>(size.x / cell_) + 1;
     height_ = static_cast<std::size_t>(size.y / cell_) + 1;
+    findHubs();
     fill();
   }
 
-  bool anyOverlap() const {
-    for (std::size_t cell = 0; cell + 1 < start_.size(); ++cell)
-      for (std::size_t i = start_[cell]; i < start_[cell + 1]; ++i)
-        for (std::size_t j = start_[cell]; j < i; ++j)
-          // Two layers cannot lie on each other without the border of one of them doing so.
-          if ((onBorder_[entries_[i]] || onBorder_[entries_[j]]) && overlap(entries_[i], entries_[j])) return true;
+  bool anyOverlap() {
+    for (std::size_t cell = 0; cell + 1 < start_.size(); ++cell) {
+      const std::span<std::uint32_t> here(entries_.data() + start_[cell], start_[cell + 1] - start_[cell]);
+      if (here.size() > kCrowd ? anyInCrowd(here) : anyOfPairs(here, here)) return true;
+    }
     return false;
   }
 
  private:
+  static constexpr double kMostCells = 16;
+  static constexpr std::size_t kCrowd = 64;
+  static constexpr std::size_t kHub = 16;  // triangles around a hub, at least
+  static constexpr std::uint32_t kNoHub = 0xffffffffu;
+
+  Vec2d longestEdge(std::uint32_t t) const {
+    const std::array<Vec2d, 3> p = corners(t);
+    const std::array<Vec2d, 3> edges = {p[1] - p[0], p[2] - p[1], p[0] - p[2]};
+    return *std::ranges::max_element(edges, {}, [](const Vec2d& e) { return glm::dot(e, e); });
+  }
+
+  bool meet(std::uint32_t s, std::uint32_t t) const {
+    if (hub_[s] != kNoHub && hub_[s] == hub_[t]) return false;
+    // Two layers cannot lie on each other without the border of one of them doing so.
+    return (onBorder_[s] || onBorder_[t]) && overlap(s, t);
+  }
+
+  /// Every pair once where both are the same.
+  bool anyOfPairs(std::span<const std::uint32_t> some, std::span<const std::uint32_t> others) const {
+    for (std::size_t i = 0; i < some.size(); ++i)
+      for (std::size_t j = 0; j < (some.data() == others.data() ? i : others.size()); ++j)
+        if (meet(some[i], others[j])) return true;
+    return false;
+  }
+
+  bool anyInCrowd(std::span<std::uint32_t> here) const {
+    std::ranges::sort(here, {}, [this](std::uint32_t t) { return hub_[t]; });
+    // Where more than half belong to one hub it is that of the middle.
+    const std::uint32_t hub = hub_[here[here.size() / 2]];
+    const auto [first, last] = std::ranges::equal_range(here, hub, {}, [this](std::uint32_t t) { return hub_[t]; });
+    const std::span<const std::uint32_t> before(here.begin(), first), of(first, last), after(last, here.end());
+    if (hub == kNoHub || 2 * of.size() < here.size()) return anyBySweep(here);
+    return anyOfPairs(before, of) || anyOfPairs(after, of) || anyOfPairs(before, after) || anyOfPairs(before, before) ||
+           anyOfPairs(after, after);
+  }
+
+  bool anyBySweep(std::span<const std::uint32_t> here) const {
+    // Directions are the same when turned by half a turn, so their double angles are added.
+    Vec2d doubled(0);
+    for (const std::uint32_t t : here) {
+      const Vec2d e = longestEdge(t);
+      const double length = glm::length(e);
+      if (length > 0) doubled += Vec2d(e.x * e.x - e.y * e.y, 2 * e.x * e.y) / length;
+    }
+    const double angle = 0.5 * std::atan2(doubled.y, doubled.x);
+    const Vec2d across(-std::sin(angle), std::cos(angle));
+    struct Interval {
+      double low, high;
+      std::uint32_t triangle;
+    };
+    std::vector<Interval> intervals;
+    for (const std::uint32_t t : here) {
+      const std::array<Vec2d, 3> p = corners(t);
+      const auto [low, high] = std::minmax({glm::dot(across, p[0]), glm::dot(across, p[1]), glm::dot(across, p[2])});
+      intervals.push_back({low, high, t});
+    }
+    std::ranges::sort(intervals, [](const Interval& a, const Interval& b) {
+      return a.low < b.low || (a.low == b.low && a.triangle < b.triangle);
+    });
+    for (std::size_t i = 0; i < intervals.size(); ++i)
+      for (std::size_t j = i + 1; j < intervals.size() && intervals[j].low < intervals[i].high; ++j)
+        if (meet(intervals[i].triangle, intervals[j].triangle)) return true;
+    return false;
+  }
+
+  /// A triangle belongs to the one of its vertices where most meet, if these are known to lie apart.
+  void findHubs() {
+    std::vector<std::uint32_t> valence(uvs_.size(), 0);
+    std::vector<double> turn(uvs_.size(), 0.0);
+    const auto count = static_cast<std::uint32_t>(chart_.size());
+    for (std::uint32_t t = 0; t < count; ++t) {
+      const std::array<Vec2d, 3> p = corners(t);
+      const std::array<std::uint32_t, 3> v = chart_.corners(t);
+      const bool isTurned = !(cornerArea(p) > 0);
+      for (std::size_t k = 0; k < 3; ++k) {
+        ++valence[v[k]];
+        const Vec2d a = p[(k + 1) % 3] - p[k], b = p[(k + 2) % 3] - p[k];
+        turn[v[k]] += isTurned ? std::numeric_limits<double>::infinity() : std::atan2(cross2(a, b), glm::dot(a, b));
+      }
+    }
+    constexpr double kFullTurn = 2 * std::numbers::pi * (1 + 1e-9);  // angles of a whole umbrella are rounded
+    hub_.assign(count, kNoHub);
+    for (std::uint32_t t = 0; t < count; ++t) {
+      std::uint32_t most = kHub - 1;
+      for (const std::uint32_t v : chart_.corners(t))
+        if (valence[v] > most && turn[v] <= kFullTurn) {
+          most = valence[v];
+          hub_[t] = v;
+        }
+    }
+  }
+
   std::array<Vec2d, 3> corners(std::uint32_t t) const {
     const std::array<std::uint32_t, 3> v = chart_.corners(t);
     return {uvs_[v[0]], uvs_[v[1]], uvs_[v[2]]};
@@ -300,6 +401,7 @@ class OverlapGrid {
   std::vector<std::size_t> start_;
   std::vector<std::uint32_t> entries_;
   std::vector<bool> onBorder_;
+  std::vector<std::uint32_t> hub_;  // per triangle: a vertex, or kNoHub
 };
 
 }  // namespace

@@ -133,10 +133,12 @@ double TexelFootprint::clip(const Atlas& atlas, const PageTexels& page, std::siz
   sources_.clear();
   pieces_.clear();
   area_ = 0.0;
+  auto known = before_.begin();
   for (const TriangleRef& ref : page.trianglesOf(texel)) {
-    const auto known = std::ranges::find(before_, ref, &Source::triangle);
+    // Both are in order.
+    while (known != before_.end() && known->triangle < ref) ++known;
     const auto source = static_cast<std::uint32_t>(sources_.size());
-    sources_.push_back(known != before_.end() ? *known : sourceOf(ref));
+    sources_.push_back(known != before_.end() && known->triangle == ref ? *known : sourceOf(ref));
     const Vec2d corner(page.coords[texel].x, page.coords[texel].y);
     if (covers(sources_.back().texels, corner + 0.5)) {
       const std::array<Vec2, 3> barycentrics = {barycentricOf(sources_.back(), corner),

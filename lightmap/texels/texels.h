@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -14,7 +15,7 @@ namespace lumel {
 struct TriangleRef {
   std::uint32_t surface = 0;   // into Atlas::surfaces
   std::uint32_t triangle = 0;  // of that surface
-  bool operator==(const TriangleRef&) const = default;
+  auto operator<=>(const TriangleRef&) const = default;
 };
 
 struct TexelCoord {

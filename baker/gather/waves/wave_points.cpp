@@ -67,7 +67,7 @@ WavePoints::Source WavePoints::sourceOf(const RayScene& rays, const Surface& sur
   source.offsetMeters = offsetDistance(corners, rays.translationOf(surface.instance));
   source.flat = source.normals[0] == source.normals[1] && source.normals[0] == source.normals[2] &&
                 source.tangents[0] == source.tangents[1] && source.tangents[0] == source.tangents[2];
-  source.rounded = isRounded(source.ng, source.e1, source.e2, source.normals);
+  source.rounded = roundedShare(source.ng, source.e1, source.e2, source.normals);
   if (source.flat) source.frame = frameFromTangent(unitNormalOr(source.normals[0], source.ng), source.tangents[0]);
   return source;
 }
@@ -75,12 +75,13 @@ WavePoints::Source WavePoints::sourceOf(const RayScene& rays, const Surface& sur
 void WavePoints::addTexel(const RayScene& rays, const Atlas& atlas, const TexelFootprint& footprint, std::size_t lane) {
   const auto firstSource = static_cast<std::uint32_t>(sources_.size());
   const std::uint32_t firstBefore = lane > 0 ? firstSource_[lane - 1] : 0;
+  std::uint32_t known = firstBefore;
   for (const TexelFootprint::Source& from : footprint.sources()) {
-    // Neighbours share triangles.
-    std::uint32_t known = firstBefore;
-    while (known < firstSource && !(sources_[known].triangle == from.triangle)) ++known;
-    sources_.push_back(known < firstSource ? Source(sources_[known])
-                                           : sourceOf(rays, atlas.surfaces[from.triangle.surface], from));
+    // Neighbours share triangles; those of both are in order.
+    while (known < firstSource && sources_[known].triangle < from.triangle) ++known;
+    sources_.push_back(known < firstSource && sources_[known].triangle == from.triangle
+                           ? Source(sources_[known])
+                           : sourceOf(rays, atlas.surfaces[from.triangle.surface], from));
   }
   for (const TexelFootprint::Piece& from : footprint.pieces()) {
     const std::array<Vec2, 3>& c = from.barycentric;
@@ -243,10 +244,10 @@ LUMEL_FOR_EACH_CPU void WavePoints::locateFrames(const Source& from, std::uint32
 LUMEL_FOR_EACH_CPU void WavePoints::lift(const Source& from, std::uint32_t number, const Places& places, Drawn& drawn) {
   const std::array<Vec3, 3> normals = from.normals;
   const Vec3 ng = from.ng, e1 = from.e1, e2 = from.e2;
-  const float distance = from.offsetMeters;
+  const float distance = from.offsetMeters, rounded = from.rounded;
   for (std::uint32_t i = 0; i < kMost; ++i) {
     const float w1 = places.x[i], w2 = places.y[i];
-    const Vec3 move = liftToRound(w1 * e1 + w2 * e2, e1, e2, {w1, w2}, normals);
+    const Vec3 move = rounded * liftToRound(w1 * e1 + w2 * e2, e1, e2, {w1, w2}, normals);
     const bool lifted = (places.source[i] == number) & isLifted(move, ng, distance);
     for (int k = 0; k < 3; ++k) {
       drawn.rayStart[k][i] += pick(lifted, move[k], 0.0f);
@@ -279,7 +280,7 @@ void WavePoints::draw(const std::array<TexelSampler, kLanes>& samplers, std::uin
       const Source& source = sources_[s];
       if (!locate(source, s, places, drawn_[lane]) || !turns_[lane]) continue;
       locateFrames(source, s, places, drawn_[lane]);
-      if (source.rounded) lift(source, s, places, drawn_[lane]);
+      if (source.rounded > 0.0f) lift(source, s, places, drawn_[lane]);
     }
   }
   turnToLanes(drawn_.data(), turning_, p_.data(), rayStarts_.data(), surfaces_.data());

@@ -72,7 +72,7 @@ class WavePoints {
     Vec3 ng{0, 0, 1};
     float offsetMeters = 0.0f;  // of ray starts
     bool flat = false;          // one frame throughout
-    bool rounded = false;       // isRounded
+    float rounded = 0.0f;       // roundedShare
     Frame frame{};              // where flat
     std::array<Vec3, 3> normals{};
     std::array<Vec4, 3> tangents{};
