@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <span>
@@ -34,9 +35,7 @@ struct WaveStats {
   std::uint64_t cutPaths = 0;
   std::size_t nonFinite = 0;
   std::vector<NonFiniteSample> firstNonFinite;
-  std::uint32_t mostSamples = 0;
   double luminance = 0.0;
-  double standardError = 0.0;
   std::size_t validTexels = 0;
   double residualSquares = 0.0;
   std::size_t residuals = 0;
@@ -50,11 +49,9 @@ void storeAux(Image& aux, TexelCoord at, const BakedTexel& texel, const Encoding
   pixel[1] = texel.validity;
   pixel[2] = texel.standardError;
   pixel[3] = static_cast<float>(texel.samples);
-  stats.mostSamples = std::max(stats.mostSamples, texel.samples);
   if (texel.validity < 0.5f) return;
   ++stats.validTexels;
   stats.luminance += static_cast<double>(luminance(stored.flat));
-  stats.standardError += static_cast<double>(texel.standardError);
   if (!texel.probed) return;
   for (std::size_t i = 0; i < kProbeNormals; ++i) {
     const auto difference =
@@ -81,18 +78,11 @@ void storeTexel(BakedPage& page, TexelCoord at, const TexelResult& texel, const 
   storeAux(page.aux, at, baked, encoding, value, stats);
 }
 
-/// Fewest samples of which an error is known.
-std::uint32_t fewestForError(Integrator integrator) {
-  return integrator == Integrator::Gather ? 2 * GatherIntegrator::kFirstPass : 2;
-}
-
 BakeStats sumUp(std::span<const WaveStats> waves, const BakeOptions& options) {
   BakeStats total;
   double luminanceSum = 0.0;
-  double errorSum = 0.0;
   double residualSquares = 0.0;
   std::size_t valid = 0;
-  std::uint32_t mostSamples = 0;
   std::size_t residuals = 0;
   std::vector<std::string> notes;
   for (const WaveStats& wave : waves) {
@@ -101,9 +91,7 @@ BakeStats sumUp(std::span<const WaveStats> waves, const BakeOptions& options) {
     total.cutPaths += wave.cutPaths;
     total.nonFiniteSamples += wave.nonFinite;
     luminanceSum += wave.luminance;
-    errorSum += wave.standardError;
     valid += wave.validTexels;
-    mostSamples = std::max(mostSamples, wave.mostSamples);
     residualSquares += wave.residualSquares;
     residuals += wave.residuals;
     for (const NonFiniteSample& s : wave.firstNonFinite)
@@ -118,11 +106,7 @@ BakeStats sumUp(std::span<const WaveStats> waves, const BakeOptions& options) {
                     " bounces is missing: surfaces of albedo 1 kept " + std::to_string(total.cutPaths) +
                     " paths without end; give them a lower albedo, or say how many --bounces count");
   total.notes = std::move(notes);
-  if (valid > 0) {
-    total.meanFlat = luminanceSum / static_cast<double>(valid);
-    if (mostSamples >= fewestForError(options.integrator))
-      total.meanStandardError = errorSum / static_cast<double>(valid);
-  }
+  if (valid > 0) total.meanFlat = luminanceSum / static_cast<double>(valid);
   if (residuals > 0 && total.meanFlat > 0)
     total.projectionResidual = std::sqrt(residualSquares / static_cast<double>(residuals)) / total.meanFlat;
   return total;
@@ -137,7 +121,7 @@ constexpr std::size_t kTexelGrain = 1024;
 /// Finishes the light of a page's texels [first, last) and stores all but the maps.
 void finishTexels(const GatherIntegrator& integrator, const GatherState& state, std::uint32_t page,
                   const PageTexels& texels, std::size_t first, std::size_t last, const Encoding& encoding,
-                  TexelLight& light, Image& aux, WaveStats& stats) {
+                  TexelLight& light, std::span<const float> mapErrors, BakedPage& baked, WaveStats& stats) {
   for (std::size_t i = first; i < last; ++i) {
     const BakedTexel texel = integrator.texel(state, page, i);
     if (!(texel.coverage > 0.0f)) continue;
@@ -145,8 +129,12 @@ void finishTexels(const GatherIntegrator& integrator, const GatherState& state, 
     SampleValue value{.flat = light.flat[t]};
     for (std::size_t k = 0; k < encoding.mapCount(); ++k) value.maps[k] = light.maps[k][t];
     encoding.finish(std::span(value.maps).first(encoding.mapCount()), value.flat);
-    for (std::size_t k = 0; k < encoding.mapCount(); ++k) light.maps[k][t] = value.maps[k];
-    storeAux(aux, texels.coords[i], texel, encoding, value, stats);
+    float* errors = baked.mapErrors.at(texels.coords[i].x, texels.coords[i].y);
+    for (std::size_t k = 0; k < encoding.mapCount(); ++k) {
+      light.maps[k][t] = value.maps[k];
+      errors[k] = mapErrors[t * encoding.mapCount() + k];
+    }
+    storeAux(baked.aux, texels.coords[i], texel, encoding, value, stats);
   }
 }
 
@@ -201,19 +189,22 @@ Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const A
   state.dropCache();
   // Texels become pages map by map: the two together would be the peak of a bake's memory.
   TexelLight light = integrator->takeLight(state);
+  std::vector<float> mapErrors = integrator->takeMapErrors(state);
   pages.resize(atlas.pages.size());
   std::vector<WaveStats> stats(1, countsOf(state));
   for (std::size_t p = 0; p < pages.size(); ++p) {
     pages[p].aux = pageImage(atlas, p, 4);
+    pages[p].mapErrors = pageImage(atlas, p, static_cast<int>(encoding.mapCount()));
     const std::size_t before = stats.size();
     stats.resize(before + (texels[p].size() + kTexelGrain - 1) / kTexelGrain);
     parallelFor(texels[p].size(), kTexelGrain, [&](std::size_t first, std::size_t last) {
       finishTexels(*integrator, state, static_cast<std::uint32_t>(p), texels[p], first, last, encoding, light,
-                   pages[p].aux, stats[before + first / kTexelGrain]);
+                   mapErrors, pages[p], stats[before + first / kTexelGrain]);
     });
   }
   session.state.reset();
   integrator.reset();
+  mapErrors = std::vector<float>();
   const auto take = [&](std::vector<Vec3>& map, auto imageOf) {
     std::vector<Image> images = takeMap(map, atlas, texels);
     for (std::size_t p = 0; p < pages.size(); ++p) imageOf(pages[p]) = std::move(images[p]);
@@ -229,13 +220,28 @@ Expected<std::vector<WaveStats>> gather(const LightTransport& transport, const A
 constexpr double kPathCredit = 0.0;
 /// Batches after which the mean of a path-traced texel is kept: each has twice the samples of the one before.
 constexpr std::array<int, 5> kMarks = {1, 2, 4, 8, TexelSums::kBatches};
-using WaveMeans = std::array<std::array<float, kLanes>, kMarks.size()>;
+/// Luminances of the flat map and of the encoding's as they would be stored.
+struct StoredMeans {
+  std::array<float, kLanes> flat{};
+  DoublingError::MapMeans maps{};
+};
+using WaveMeans = std::array<StoredMeans, kMarks.size()>;
+
+/// As if light had one colour: of the maps' colours only the luminance is known.
+void keepMeans(const TexelSums& sums, int mark, const Encoding& encoding, std::size_t lane, StoredMeans& means) {
+  const std::array<float, 1 + kMostMaps> luminances = sums.luminancesBefore(mark);
+  std::array<Vec3, kMostMaps> maps{};
+  for (std::size_t k = 0; k < encoding.mapCount(); ++k) maps[k] = Vec3(luminances[k + 1]);
+  encoding.finish(std::span(maps).first(encoding.mapCount()), Vec3(luminances[0]));
+  means.flat[lane] = luminances[0];
+  for (std::size_t k = 0; k < encoding.mapCount(); ++k) means.maps[k][lane] = maps[k].x;
+}
 
 /// The standard errors of path-traced texels, as if their samples had been taken by doubling.
 void storePathErrors(const Waves& waves, const std::vector<WaveMeans>& means, int samples,
-                     const std::vector<PageTexels>& texels, std::vector<BakedPage>& pages,
-                     std::vector<WaveStats>& stats) {
+                     const std::vector<PageTexels>& texels, std::size_t maps, std::vector<BakedPage>& pages) {
   DoublingError errors(waves, kPathCredit);
+  errors.mapSums.resize(waves.texels() * maps);
   const std::vector<std::uint8_t> live(waves.size(), 1);
   for (std::size_t m = 0; m < kMarks.size(); ++m) {
     const auto samplesAt = [samples](int mark) {
@@ -244,17 +250,23 @@ void storePathErrors(const Waves& waves, const std::vector<WaveMeans>& means, in
     const std::uint32_t before = m == 0 ? 0 : samplesAt(kMarks[m - 1]);
     const std::uint32_t now = samplesAt(kMarks[m]);
     if (now == before) continue;
-    for (std::size_t w = 0; w < waves.size(); ++w)
-      errors.add(waves, w, means[w][m == 0 ? 0 : m - 1], means[w][m], before, now - before);
+    for (std::size_t w = 0; w < waves.size(); ++w) {
+      const StoredMeans& first = means[w][m == 0 ? 0 : m - 1];
+      errors.add(waves, w, first.flat, means[w][m].flat, before, now - before);
+      errors.addMaps(waves, w, first.maps, means[w][m].maps, before, now - before);
+    }
     errors.endPass(waves, live);
   }
+  const std::vector<float> mapErrors = errors.takeMapErrors(waves, maps);
   for (std::size_t w = 0; w < waves.size(); ++w)
     for (std::size_t i = 0; i < waves[w].count; ++i) {
       const TexelCoord at = texels[waves[w].page].coords[waves[w].first + i];
-      float* aux = pages[waves[w].page].aux.at(at.x, at.y);
+      BakedPage& page = pages[waves[w].page];
+      float* aux = page.aux.at(at.x, at.y);
       if (!(aux[0] > 0.0f)) continue;
       aux[2] = errors.standardError(waves, w, i);
-      if (aux[1] >= 0.5f) stats[w].standardError += static_cast<double>(aux[2]);
+      std::copy_n(mapErrors.begin() + static_cast<std::ptrdiff_t>((waves[w].start + i) * maps), maps,
+                  page.mapErrors.at(at.x, at.y));
     }
 }
 
@@ -297,6 +309,7 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
     pages[p].flat = pageImage(atlas, p, 3);
     pages[p].maps.assign(encoding.mapCount(), pages[p].flat);
     pages[p].aux = pageImage(atlas, p, 4);
+    pages[p].mapErrors = pageImage(atlas, p, static_cast<int>(encoding.mapCount()));
   }
   const Waves waves(texels);
   std::vector<WaveStats> waveStats(waves.size());
@@ -317,7 +330,8 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
       done.nonFinite.resize(std::min(done.nonFinite.size(), kMostNotes));
       stats.firstNonFinite = std::move(done.nonFinite);
       for (std::size_t m = 0; m < kMarks.size(); ++m)
-        for (std::size_t i = 0; i < wave.count; ++i) means[w][m][i] = done.texels[i].sums.luminanceBefore(kMarks[m]);
+        for (std::size_t i = 0; i < wave.count; ++i)
+          keepMeans(done.texels[i].sums, kMarks[m], encoding, i, means[w][m]);
       for (std::size_t i = 0; i < wave.count; ++i)
         storeTexel(pages[wave.page], page.coords[wave.first + i], done.texels[i], encoding, stats);
       progress.advance(wave.count);
@@ -326,7 +340,7 @@ Expected<std::vector<WaveStats>> tracePaths(const LightTransport& transport, con
   progress.end();
   if (progress.cancelled()) return interrupted();
   judgeCovers(transport, atlas, texels, pages, waveStats.emplace_back());
-  storePathErrors(waves, means, std::max(1, options.samples), texels, pages, waveStats);
+  storePathErrors(waves, means, std::max(1, options.samples), texels, encoding.mapCount(), pages);
   return waveStats;
 }
 
@@ -388,10 +402,38 @@ Expected<BakeResult> bake(const LitScene& scene, const Atlas& atlas, const std::
       traceCrossings(transport.rays, crossings, blocked);
     });
   result.stats = sumUp(*waveStats, options);
+  if (transport.dark())  // known without samples
+    for (BakedPage& page : result.pages) {
+      for (std::size_t i = 2; i < page.aux.pixels.size(); i += 4) page.aux.pixels[i] = 0.0f;
+      std::fill(page.mapErrors.pixels.begin(), page.mapErrors.pixels.end(), 0.0f);
+    }
+  result.stats.errors = statedErrors(result.pages, *options.encoding);
   for (const PageTexels& page : texels) result.stats.texels += page.size();
   result.stats.notes.insert(result.stats.notes.begin(), scene.notes().begin(), scene.notes().end());
   result.stats.seconds = sinceStart.seconds();
   return result;
+}
+
+std::vector<MapErrorFigure> statedErrors(std::span<const BakedPage> pages, const Encoding& encoding) {
+  std::vector<MapErrorFigure> figures{{"flat"}};
+  for (const std::string& name : encoding.mapNames()) figures.push_back({name});
+  std::vector<std::size_t> known(figures.size(), 0);
+  for (const BakedPage& page : pages)
+    for (std::size_t i = 0; i < page.aux.pixels.size() / 4; ++i) {
+      const float* aux = page.aux.pixels.data() + 4 * i;
+      if (!(aux[0] > 0.0f) || aux[1] < 0.5f) continue;
+      for (std::size_t m = 0; m < figures.size(); ++m) {
+        const float error = m == 0 ? aux[2] : page.mapErrors.pixels[i * encoding.mapCount() + m - 1];
+        if (!std::isfinite(error)) continue;
+        figures[m].mean += static_cast<double>(error);
+        ++known[m];
+      }
+    }
+  for (std::size_t m = 0; m < figures.size(); ++m) {
+    if (known[m] == 0) return {};
+    figures[m].mean /= static_cast<double>(known[m]);
+  }
+  return figures;
 }
 
 std::uint64_t sessionKey(const LitScene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,

@@ -1,6 +1,7 @@
 // The main job: irradiance at every texel of an atlas, as the maps of an encoding.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -25,9 +26,16 @@ struct BakedPage {
   std::vector<Image> maps;  // RGB: those of BakeOptions::encoding, in their order
   Image flat;               // RGB: irradiance / pi
   // Channels of aux, in order: coverage (area share 0..1), validity (share of gather rays that met no back of a
-  // single-sided surface), stderr (standard error of the flat map's luminance), samples (those taken of this texel:
-  // fewer where its error has settled, or where it is inside of something).
+  // single-sided surface), stderr (standard error of the flat map's luminance; NaN: not known), samples (those taken of
+  // this texel: fewer where its error has settled, or where it is inside of something).
   Image aux;
+  Image mapErrors;  // a channel for each of `maps`: standard error of its luminance; NaN: not known
+};
+
+/// Mean standard error of a map's luminance over covered, valid texels of which it is known.
+struct MapErrorFigure {
+  std::string map;
+  double mean = 0.0;
 };
 
 /// Cost and error figures of a bake, written to bake.json.
@@ -36,15 +44,21 @@ struct BakeStats {
   std::uint64_t rays = 0;        // closest-hit
   std::uint64_t shadowRays = 0;  // occlusion
   double seconds = 0.0;
-  std::uint64_t cutPaths = 0;               // paths that were ended by force, named in `notes` (kMostLosslessHits)
-  std::size_t nonFiniteSamples = 0;         // counted and left out of the sums, named in `notes`; never silently zeroed
-  double meanFlat = 0.0;                    // mean luminance over covered, valid texels
-  std::optional<double> meanStandardError;  // mean of aux stderr over the same; none of too few samples
+  std::uint64_t cutPaths = 0;        // paths that were ended by force, named in `notes` (kMostLosslessHits)
+  std::size_t nonFiniteSamples = 0;  // counted and left out of the sums, named in `notes`; never silently zeroed
+  double meanFlat = 0.0;             // mean luminance over covered, valid texels
+  std::vector<MapErrorFigure>
+      errors;                       // of the flat map and the others, as the pages have them; none of too few samples
   double projectionResidual = 0.0;  // RMS difference between decoded and true irradiance / pi over sample normals
                                     // within 30 degrees, relative to meanFlat
   SeamFigures seams;                // known after finishPages alone
   std::vector<std::string> notes;
 };
+
+/// The map whose error is the greatest. Precondition: there is one.
+inline const MapErrorFigure& worstOf(std::span<const MapErrorFigure> errors) {
+  return *std::ranges::max_element(errors, {}, &MapErrorFigure::mean);
+}
 
 struct BakeResult {
   std::vector<BakedPage> pages;
@@ -66,6 +80,9 @@ Expected<BakeResult> bake(const Scene& scene, const Atlas& atlas, const std::vec
 /// Input, where the session's state is of another bake.
 Expected<BakeResult> bake(const LitScene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,
                           const BakeOptions& options, Progress& progress, GatherSession* session = nullptr);
+
+/// The errors that the pages state, the flat map's first; empty where none is known.
+std::vector<MapErrorFigure> statedErrors(std::span<const BakedPage> pages, const Encoding& encoding);
 
 /// Tells the states of one bake from those of others (readState): a hash of options, texels and surfaces.
 std::uint64_t sessionKey(const LitScene& scene, const Atlas& atlas, const std::vector<PageTexels>& texels,

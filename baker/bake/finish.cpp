@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <span>
 
 #include "lightmap/maps/denoise.h"
@@ -60,29 +61,36 @@ PageState stateOf(const BakedPage& page, const Atlas& atlas, const PageTexels& t
 
 constexpr std::size_t kErrorChannel = 2;
 
+/// Where a page keeps the errors of its maps, the flat one first.
+std::vector<ErrorPlane> errorsOf(BakedPage& page) {
+  std::vector<ErrorPlane> planes{{page.aux.pixels.data() + kErrorChannel, 4}};
+  const std::size_t maps = page.maps.size();
+  for (std::size_t k = 0; k < maps; ++k) planes.push_back({page.mapErrors.pixels.data() + k, maps});
+  return planes;
+}
+
 /// The mean of the standard errors of covered texels around one.
-float errorAround(const Image& aux, std::uint32_t texel) {
+float errorAround(const Image& aux, const ErrorPlane& errors, std::uint32_t texel) {
   const int x = static_cast<int>(texel) % aux.width, y = static_cast<int>(texel) / aux.width;
   float sum = 0.0f, count = 0.0f;
   for (int v = std::max(y - 1, 0); v <= std::min(y + 1, aux.height - 1); ++v)
     for (int u = std::max(x - 1, 0); u <= std::min(x + 1, aux.width - 1); ++u) {
-      const float* pixel = aux.at(u, v);
-      if (!(pixel[0] > 0.0f) || !std::isfinite(pixel[kErrorChannel])) continue;
-      sum += pixel[kErrorChannel];
+      const float error = errors[static_cast<std::size_t>(v) * static_cast<std::size_t>(aux.width) + u];
+      if (!(aux.at(u, v)[0] > 0.0f) || !std::isfinite(error)) continue;
+      sum += error;
       count += 1.0f;
     }
-  return count > 0.0f ? sum / count : 0.0f;
+  return count > 0.0f ? sum / count : std::numeric_limits<float>::quiet_NaN();
 }
 
 /// Makes texels beyond seams part of their charts while noise is taken out: they hold what continues these.
 void addBeyond(const Seams& seams, std::span<const BeyondTexel> beyond, std::vector<std::uint32_t>& charts,
-               PageState& state, BakedPage& page) {
+               PageState& state) {
   for (const BeyondTexel& texel : beyond) {
     if (charts[texel.texel] != 0) continue;
     const SeamSide& side = seams.pairs[texel.pair].sides[texel.side];
     charts[texel.texel] = side.chart + 1;
     state.normals[texel.texel] = coarse(side.frame.n);
-    page.aux.pixels[std::size_t{4} * texel.texel + kErrorChannel] = errorAround(page.aux, texel.texel);
   }
 }
 
@@ -90,12 +98,24 @@ void denoisePage(BakedPage& page, PageState& state, const Seams& seams, std::spa
   std::vector<std::uint32_t> charts = state.chartIds;
   for (std::size_t i = 0; i < charts.size(); ++i)
     if (state.valid.known[i] == 0) charts[i] = 0;
-  addBeyond(seams, beyond, charts, state, page);
-  denoise(page.flat, page.maps, charts, state.normals, std::span(page.aux.pixels).subspan(kErrorChannel), 4);
-  for (const BeyondTexel& texel : beyond) page.aux.pixels[std::size_t{4} * texel.texel + kErrorChannel] = 0.0f;
+  addBeyond(seams, beyond, charts, state);
+  denoise(page.flat, page.maps, charts, state.normals, errorsOf(page));
 }
 
-std::vector<SeamPage> seamPagesOf(std::vector<BakedPage>& pages) {
+/// Calls grow(image) for the maps' errors, a channel for each.
+template <class Grow>
+void growErrors(BakedPage& page, const Grow& grow) {
+  const std::vector<ErrorPlane> planes = errorsOf(page);
+  Image errors(page.aux.width, page.aux.height, static_cast<int>(planes.size()));
+  const std::size_t count = page.aux.pixels.size() / 4;
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t m = 0; m < planes.size(); ++m) errors.pixels[i * planes.size() + m] = planes[m][i];
+  grow(errors);
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t m = 0; m < planes.size(); ++m) planes[m][i] = errors.pixels[i * planes.size() + m];
+}
+
+std::vector<SeamPage> seamPagesOf(std::vector<BakedPage>& pages, bool isSigned) {
   std::vector<SeamPage> seamPages;
   for (BakedPage& page : pages) {
     SeamPage& to = seamPages.emplace_back();
@@ -108,6 +128,7 @@ std::vector<SeamPage> seamPagesOf(std::vector<BakedPage>& pages) {
     to.errors = std::span(page.aux.pixels).subspan(std::min(kErrorChannel, page.aux.pixels.size()));
     to.coverages = page.aux.pixels;
     to.stride = 4;
+    to.isSigned = isSigned;
   }
   return seamPages;
 }
@@ -134,6 +155,7 @@ void dilatePage(BakedPage& page, std::span<const BeyondTexel> beyond, int rings)
     TexelMask mask = known;
     dilate(map, mask, rings);
   });
+  growErrors(page, [&](Image& errors) { dilate(errors, known, rings); });
 }
 
 }  // namespace
@@ -146,15 +168,21 @@ SeamFigures finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const
   std::vector<BeyondTexel> beyond;
   const bool mends = !seams.points.empty() && canMend(pages.front().maps.size());
   if (mends) {
-    seamPages = seamPagesOf(pages);
+    seamPages = seamPagesOf(pages, options.isSigned);
     beyond = texelsBeyond(seams, seamPages);
     continueLight(seams, beyond, seamPages);
+    for (const BeyondTexel& texel : beyond)
+      for (const ErrorPlane& plane : errorsOf(pages[texel.page]))
+        plane[texel.texel] = errorAround(pages[texel.page].aux, plane, texel.texel);
   }
   for (std::size_t p = 0; p < pages.size(); ++p) {
     PageState state = stateOf(pages[p], atlas, texels[p], options.denoise);
     if (options.denoise) denoisePage(pages[p], state, seams, onPage(beyond, p));
-    if (state.hasHoles)
-      forEachMap(pages[p], [&](Image& map) { fillHoles(map, state.valid, state.chartIds, state.holes); });
+    if (state.hasHoles) {
+      const auto fill = [&](Image& map) { fillHoles(map, state.valid, state.chartIds, state.holes); };
+      forEachMap(pages[p], fill);
+      growErrors(pages[p], fill);
+    }
   }
   SeamFigures figures;
   if (mends) figures = mendSeams(seams, beyond, seamPages);

@@ -16,6 +16,7 @@ struct FinishOptions {
   bool denoise = false;
   int rings = 0;                 // of texels that maps grow by, beyond what is covered
   const Seams* seams = nullptr;  // where lookups from both sides shall agree; of no effect without rings
+  bool isSigned = false;         // whether maps may be negative (Encoding::isSigned)
 };
 
 /// First noise is taken out of the maps, if asked for (lightmap/denoise.h); invalid texels take no part.
@@ -23,8 +24,8 @@ struct FinishOptions {
 /// a pillar) takes the light of the nearest valid texels of its chart, where the chart has any; it would leak darkness
 /// into bilinear lookups beside it. At seams, the texels beyond a chart's border take the light of the other side
 /// before noise is taken out, and lookups from both sides are made to agree after. Then every map grows by `rings`, so
-/// that a lookup at a chart's border does not mix in black. The aux images stay as they are: they still tell own values
-/// from others, and give the error before denoising.
+/// that a lookup at a chart's border does not mix in black. The errors that pages state become those of the maps as
+/// they are then, also where these were grown; the other aux channels stay as they are and tell own values from others.
 SeamFigures finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels,
                         const FinishOptions& options);
 

@@ -39,7 +39,7 @@ void declareOptions(OptionTable& options, StudyArguments& a) {
   options.integerOrWord("bounces", a.study.bounces, {0, 1024}, "all", kAllBounces,
                         "Indirect bounces; 0: direct light only, all: as many as matter");
   declareSkyAndSides(options, a);
-  options.choice("projection", a.study.projection, {"raw", "flat", "fit"},
+  options.choice("projection", a.study.projection, {"raw", "flat", "fit", "signed"},
                  "Of the maps that are compared; the residual is measured for all three");
   options.integer("seed", a.study.seed, "Seed of the candidates; the reference has seeds of its own");
   // A study needs tens of bakes: a small page says the same about error per texel.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "scene/base/parallel.h"
 
@@ -43,6 +44,21 @@ void DoublingError::add(const Waves& waves, std::size_t index, std::span<const f
   known.moved = n0 == 0 ? -1.0 : sum;
   known.samplesBefore = n0;
   known.samples = n0 + n1;
+}
+
+void DoublingError::addMaps(const Waves& waves, std::size_t index, const MapMeans& before, const MapMeans& now,
+                            std::uint32_t n0, std::uint32_t n1, std::uint32_t leftOut) {
+  const Wave& wave = waves[index];
+  const std::size_t maps = mapSums.size() / squares.size();
+  const double scale = std::sqrt(static_cast<double>(n0) / n1);
+  // The rate is that of the passes before: the one of this pass is known when all waves are through.
+  const double fall = n0 == 0 ? 0.0 : std::pow(static_cast<double>(n0) / (n0 + n1), rate);
+  for (std::size_t i = 0; i < wave.count; ++i)
+    for (std::size_t k = 0; k < maps; ++k) {
+      float& sum = mapSums[(wave.start + i) * maps + k];
+      const double d = (static_cast<double>(now[k][i]) - static_cast<double>(before[k][i])) * scale;
+      sum = (leftOut >> i) & 1u ? kLeftOut : static_cast<float>(static_cast<double>(sum) * fall + d * d);
+    }
 }
 
 void DoublingError::endPass(const Waves& waves, const std::vector<std::uint8_t>& live) {
@@ -90,13 +106,55 @@ double DoublingError::poolAround(const Waves& waves, std::size_t index) const {
   return texels > 0.0 ? pooled / texels : 0.0;
 }
 
+/// `own`: of the texel's d^2, `pool`: mean d^2 of the neighbourhood.
+double DoublingError::error(const OfWave& known, double factor, double own, double pool) {
+  if (known.doublings == 0) return std::numeric_limits<double>::quiet_NaN();
+  const double joined = (own + kPrior * pool) / (known.doublings + kPrior);
+  const double moved = own < 0.0 ? pool : std::max(own / known.doublings, joined);
+  return std::sqrt(factor * moved);
+}
+
 float DoublingError::standardError(const Waves& waves, std::size_t index, std::size_t i) const {
   const OfWave& known = ofWaves[index];
-  if (known.doublings == 0) return 0.0f;
-  const auto own = static_cast<double>(sums[waves[index].start + i]);
-  const double joined = (own + kPrior * known.pool) / (known.doublings + kPrior);
-  const double moved = own < 0.0 ? known.pool : std::max(own / known.doublings, joined);
-  return static_cast<float>(std::sqrt(known.factor * moved));
+  return static_cast<float>(error(known, known.factor, static_cast<double>(sums[waves[index].start + i]), known.pool));
+}
+
+std::vector<float> DoublingError::takeMapErrors(const Waves& waves, std::size_t maps) {
+  // Per wave, the sums of its texels that count, in the units of one d^2.
+  std::vector<std::array<double, kMostMaps>> ofWave(waves.size());
+  parallelFor(waves.size(), 256, [&](std::size_t first, std::size_t last) {
+    for (std::size_t w = first; w < last; ++w) {
+      if (ofWaves[w].doublings == 0) continue;
+      for (std::size_t t = waves[w].start; t < waves[w].start + waves[w].count; ++t)
+        for (std::size_t k = 0; k < maps; ++k)
+          ofWave[w][k] += std::max(0.0, static_cast<double>(mapSums[t * maps + k])) / ofWaves[w].doublings;
+    }
+  });
+  std::vector<float> errors = std::move(mapSums);
+  parallelFor(waves.size(), 256, [&](std::size_t first, std::size_t last) {
+    for (std::size_t w = first; w < last; ++w) {
+      std::array<double, kMostMaps> pool{};
+      double texels = 0.0;
+      for (const std::uint32_t near : waves.around(w)) {
+        if (near == Waves::kNone || ofWaves[near].doublings == 0) continue;
+        const std::uint32_t samples = ofWaves[w].samples;
+        // A wave that was done earlier has fewer samples.
+        const double fall = ofWaves[near].samples == samples
+                                ? 1.0
+                                : std::pow(static_cast<double>(ofWaves[near].samples) / samples, rate);
+        for (std::size_t k = 0; k < maps; ++k) pool[k] += ofWave[near][k] * fall;
+        texels += ofWaves[near].counting;
+      }
+      const double factor = std::pow(ofWaves[w].factor, kMapCredit);
+      for (std::size_t t = waves[w].start; t < waves[w].start + waves[w].count; ++t)
+        for (std::size_t k = 0; k < maps; ++k) {
+          float& value = errors[t * maps + k];
+          value = static_cast<float>(
+              error(ofWaves[w], factor, static_cast<double>(value), texels > 0.0 ? pool[k] / texels : 0.0));
+        }
+    }
+  });
+  return errors;
 }
 
 }  // namespace lumel

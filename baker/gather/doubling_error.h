@@ -1,12 +1,14 @@
 // The standard error of texels whose samples are doubled again and again, from how far their means move.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "baker/gather/waves/waves.h"
+#include "lightmap/maps/encoding.h"
 
 namespace lumel {
 
@@ -25,9 +27,14 @@ namespace lumel {
 /// moved more than they did: at the border of a shadow it knows better. Measured (four scenes, 32 to 1024 samples):
 /// baker/README.md.
 ///
+/// The maps of an encoding have their own d^2; the rate is the flat map's, since they are of the same samples, and half
+/// as much credit again is taken (kMapCredit): with the flat map's, 97 to 98.4% of a Cornell box's texels lay within
+/// their intervals (lightmap/maps/README.md has the figures with it).
+///
 /// Plain data: what is known of the errors of all texels between two passes.
 struct DoublingError {
   static constexpr double kPrior = 4.0;
+  static constexpr double kMapCredit = 1.5;
 
   /// `creditTaken`: 0 to 1.
   DoublingError(const Waves& waves, double creditTaken);
@@ -38,11 +45,17 @@ struct DoublingError {
   /// given the error of those around it.
   void add(const Waves& waves, std::size_t wave, std::span<const float> before, std::span<const float> now,
            std::uint32_t n0, std::uint32_t n1, std::uint32_t leftOut = 0);
+  /// The same for the maps of the encoding; before `add` or after it.
+  using MapMeans = std::array<std::array<float, kLanes>, kMostMaps>;
+  void addMaps(const Waves& waves, std::size_t wave, const MapMeans& before, const MapMeans& now, std::uint32_t n0,
+               std::uint32_t n1, std::uint32_t leftOut = 0);
   /// Ends a pass in which every wave of `live` was added with the same n0 and n1: measures the rate, renews the errors.
   void endPass(const Waves& waves, const std::vector<std::uint8_t>& live);
 
-  /// Returns the standard error of the mean over all samples of the wave's texel `i`; 0 before the first doubling.
+  /// Returns the standard error of the mean over all samples of the wave's texel `i`; NaN before the first doubling.
   float standardError(const Waves& waves, std::size_t wave, std::size_t i) const;
+  /// Turns `mapSums`, of `maps` maps, into such standard errors; nothing can be added after that.
+  std::vector<float> takeMapErrors(const Waves& waves, std::size_t maps);
 
   /// What is known of the texels of a wave.
   struct OfWave {
@@ -60,11 +73,13 @@ struct DoublingError {
   std::vector<OfWave> ofWaves;
   std::vector<float> squares;  // per texel, of the last pass: d^2; kLeftOut: it took no samples
   std::vector<float> sums;     // of d^2 over all passes, each scaled to the samples of the last; kLeftOut
+  std::vector<float> mapSums;  // that of the encoding's maps, texel by texel; empty where they are not asked for
   double credit = 0.0;
   double rate = 1.2;  // until it is measured: what scenes have at 16 samples
 
  private:
   double poolAround(const Waves& waves, std::size_t wave) const;
+  static double error(const OfWave& known, double factor, double own, double pool);
 };
 
 }  // namespace lumel

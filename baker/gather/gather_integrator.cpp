@@ -150,6 +150,17 @@ TexelLight GatherIntegrator::takeLight(GatherState& state) const {
   return light;
 }
 
+std::vector<float> GatherIntegrator::takeMapErrors(GatherState& state) const {
+  const std::size_t maps = scene_.encoding.mapCount();
+  std::vector<float> errors = state.errors.takeMapErrors(waves_, maps);
+  parallelFor(waves_.texels(), kTexelGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t t = first; t < last; ++t)
+      for (std::size_t k = 0; k < maps; ++k)
+        errors[t * maps + k] *= static_cast<float>(state.samplesOf[t]) / state.weightOf(t);
+  });
+  return errors;
+}
+
 BakedTexel GatherIntegrator::texel(const GatherState& state, std::uint32_t page, std::size_t index) const {
   const std::size_t t = numberOf(page, index);
   const float scale = 1.0f / state.weightOf(t);

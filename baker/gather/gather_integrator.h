@@ -21,7 +21,7 @@ namespace lumel {
 struct BakedTexel {
   float coverage = 0.0f;
   float validity = 1.0f;
-  float standardError = 0.0f;
+  float standardError = 0.0f;  // of the flat map's luminance; NaN: not known
   std::uint32_t samples = 0;
   bool probed = false;
   std::array<Vec3, kProbeNormals> probes{};  // mean light on probeNormals(), where probed
@@ -54,8 +54,8 @@ struct GatherPauses {
 /// chart has none, those that stay dark are not. Of other texels the parts that are inside do not count: the mean is
 /// over samples from footprint points in the open.
 ///
-/// Errors: DoublingError, for the flat map; those of the worst map follow by how much farther it moved around the wave.
-/// When texels are done: stopping.h.
+/// Errors: DoublingError. Whether a texel is done is told by the flat map's and by how much farther the worst map moved
+/// around the wave: stopping.h.
 class GatherIntegrator {
  public:
   /// Samples of the first pass; once they are doubled errors are known.
@@ -77,6 +77,9 @@ class GatherIntegrator {
   /// After run. takeLight once: the light leaves the state.
   TexelLight takeLight(GatherState& state) const;
   BakedTexel texel(const GatherState& state, std::uint32_t page, std::size_t index) const;
+  /// Standard errors of the luminance of the encoding's maps, as Encoding::finish leaves them, texel by texel; NaN: not
+  /// known. Once: they leave the state.
+  std::vector<float> takeMapErrors(GatherState& state) const;
   /// Number of a page's texel among those of all pages.
   std::size_t numberOf(std::size_t page, std::size_t index) const {
     return waves_[waves_.waveOf(page, index)].start + index % kLanes;

@@ -20,6 +20,16 @@ constexpr double kDarkInside = 0.01;
 
 float square(float x) { return x * x; }
 
+/// Luminances of a texel's maps as they would be stored after `samples`.
+void storedMaps(const Encoding& encoding, const TexelLight& sums, std::size_t texel, std::uint32_t samples,
+                std::size_t lane, DoublingError::MapMeans& stored) {
+  std::array<Vec3, kMostMaps> maps{};
+  const float scale = 1.0f / static_cast<float>(std::max(1u, samples));
+  for (std::size_t k = 0; k < sums.maps.size(); ++k) maps[k] = sums.maps[k][texel] * scale;
+  encoding.finish(std::span(maps).first(sums.maps.size()), sums.flat[texel] * scale);
+  for (std::size_t k = 0; k < sums.maps.size(); ++k) stored[k][lane] = luminance(maps[k]);
+}
+
 /// Adds what a wave gathered in samples [first, end).
 void store(const GatherScene& scene, GatherState& state, std::size_t index, const GatheredWave& gathered,
            std::uint32_t first, std::uint32_t end) {
@@ -28,6 +38,7 @@ void store(const GatherScene& scene, GatherState& state, std::size_t index, cons
   moved = {};
   std::array<float, kLanes> before{};
   std::array<float, kLanes> now{};
+  DoublingError::MapMeans mapsBefore{}, mapsNow{};
   std::uint32_t leftOut = 0;
   for (std::size_t i = 0; i < wave.count; ++i) {
     const GatheredTexel& texel = gathered.texels[i];
@@ -39,6 +50,7 @@ void store(const GatherScene& scene, GatherState& state, std::size_t index, cons
     state.samplesOf[t] = end;
     Vec3& flat = state.sums.flat[t];
     before[i] = luminance(flat) / static_cast<float>(std::max(1u, first));
+    storedMaps(scene.encoding, state.sums, t, first, i, mapsBefore);
     flat += Vec3(texel.flat);
     if (!state.seen.empty()) state.seen[t] += Vec3(texel.seen);
     now[i] = luminance(flat) / static_cast<float>(end);
@@ -49,6 +61,7 @@ void store(const GatherScene& scene, GatherState& state, std::size_t index, cons
       sum += Vec3(texel.maps[k]);
       moved[k + 1] += square(luminance(sum) / static_cast<float>(end) - mean);
     }
+    storedMaps(scene.encoding, state.sums, t, end, i, mapsNow);
     if (!scene.levels.endless)
       for (std::size_t l = 0; l < scene.stored(); ++l) state.levelSums[t * scene.stored() + l] += Vec3(texel.levels[l]);
     if ((wave.first + i) % kProbeStride == 0)
@@ -57,6 +70,7 @@ void store(const GatherScene& scene, GatherState& state, std::size_t index, cons
     if (state.covers[t] != Cover::Open) state.backFaces[t] += texel.backFaces;
   }
   state.errors.add(scene.waves, index, before, now, first, end - first, leftOut);
+  state.errors.addMaps(scene.waves, index, mapsBefore, mapsNow, first, end - first, leftOut);
   state.waves[index].samples = end;
 }
 

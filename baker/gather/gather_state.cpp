@@ -65,6 +65,7 @@ void visitMembers(State& s, Visit visit) {
   visit(s.errors.ofWaves);
   visit(s.errors.squares);
   visit(s.errors.sums);
+  visit(s.errors.mapSums);
   visit(s.errors.credit);
   visit(s.errors.rate);
   visit(s.sums.flat);
@@ -177,6 +178,7 @@ GatherState::GatherState(const GatherScene& scene) : waves(scene.waves.size()), 
 void GatherState::makeSums(const GatherScene& scene) {
   const std::size_t count = scene.map.size();
   sums.resize(count, scene.encoding.mapCount());
+  errors.mapSums.resize(count * scene.encoding.mapCount());
   coverage.resize(count);
   if (!scene.levels.endless) levelSums.resize(count * scene.stored());
   probes.resize(scene.waves.probes());
@@ -205,6 +207,7 @@ bool GatherState::fits(const GatherScene& scene) const {
              has(sums.flat, summed) && has(coverage, summed) && has(probes, isWarm ? scene.waves.probes() : 0) &&
              has(uneven, isWarm ? cached : 0);
   fit = fit && has(sums.maps, isWarm ? scene.encoding.mapCount() : 0);
+  fit = fit && has(errors.mapSums, summed * scene.encoding.mapCount());
   for (const std::vector<Vec3>& map : sums.maps) fit = fit && has(map, summed);
   const std::size_t sources = scene.strategies.empty() ? 0 : scene.strategies.size() + 1;
   return fit && has(levelSums, scene.levels.endless ? 0 : summed * scene.stored()) &&

@@ -16,14 +16,17 @@ float TexelSums::validity() const {
   return static_cast<float>(1.0 - static_cast<double>(backFaces_) / gatherRays_);
 }
 
-float TexelSums::luminanceBefore(int batch) const {
-  double sum = 0.0;
+std::array<float, 1 + kMostMaps> TexelSums::luminancesBefore(int batch) const {
+  std::array<double, 1 + kMostMaps> sums{};
   std::uint32_t count = 0;
   for (std::size_t b = 0; b < static_cast<std::size_t>(batch); ++b) {
-    sum += batchSum_[b];
+    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += batchSum_[b][i];
     count += batchCount_[b];
   }
-  return count == 0 ? 0.0f : static_cast<float>(sum / count);
+  std::array<float, 1 + kMostMaps> means{};
+  if (count > 0)
+    for (std::size_t i = 0; i < sums.size(); ++i) means[i] = static_cast<float>(sums[i] / count);
+  return means;
 }
 
 }  // namespace lumel

@@ -26,7 +26,8 @@ class TexelSums {
     flat_ += value.flat;
     for (std::size_t i = 0; i < maps; ++i) maps_[i] += value.maps[i];
     const auto b = static_cast<std::size_t>(batch);
-    batchSum_[b] += static_cast<double>(luminance(value.flat));
+    batchSum_[b][0] += static_cast<double>(luminance(value.flat));
+    for (std::size_t i = 0; i < maps; ++i) batchSum_[b][i + 1] += static_cast<double>(luminance(value.maps[i]));
     ++batchCount_[b];
     ++count_;
   }
@@ -40,13 +41,14 @@ class TexelSums {
   SampleValue mean() const;
   /// Returns the share of gather rays that met no back face of a single-sided surface; 1 where none was traced.
   float validity() const;
-  /// Returns the luminance of the mean over the batches before `batch`; 0 where they have no samples.
-  float luminanceBefore(int batch) const;
+  /// Returns the luminances of the means over the batches before `batch`, the flat map's first; 0 where they have no
+  /// samples.
+  std::array<float, 1 + kMostMaps> luminancesBefore(int batch) const;
 
  private:
   Vec3d flat_{0};
   std::array<Vec3d, kMostMaps> maps_{};
-  std::array<double, kBatches> batchSum_{};
+  std::array<std::array<double, 1 + kMostMaps>, kBatches> batchSum_{};
   std::array<std::uint32_t, kBatches> batchCount_{};
   std::uint32_t count_ = 0;
   std::uint32_t gatherRays_ = 0;

@@ -210,8 +210,11 @@ Expected<void> Studying::makeReference() {
     for (std::size_t i = 0; i < a.size(); ++i) a[i] = 0.5f * (a[i] + b[i]);
   };
   average(truth_.flat, halves[1].flat);
-  for (std::size_t i = 0; i < truth_.standardError.size(); ++i)
-    truth_.standardError[i] = 0.5f * std::hypot(truth_.standardError[i], halves[1].standardError[i]);
+  const auto averageErrors = [](std::vector<float>& a, const std::vector<float>& b) {
+    for (std::size_t i = 0; i < a.size(); ++i) a[i] = 0.5f * std::hypot(a[i], b[i]);
+  };
+  averageErrors(truth_.standardError, halves[1].standardError);
+  for (std::size_t k = 0; k < mapCount; ++k) averageErrors(truth_.mapErrors[k], halves[1].mapErrors[k]);
   for (std::size_t k = 0; k < mapCount; ++k) average(truth_.maps[k], halves[1].maps[k]);
   reference.meanFlat = meanOf(truth_.flat);
   if (!(reference.meanFlat > 0.0))
@@ -237,7 +240,7 @@ std::vector<Studying::Candidate> Studying::candidates() const {
   // What says most for its time comes first: the budget may end.
   int gather = kStudyLeastSamples;
   for (; gather <= usual; gather *= 2) addGather(gather);
-  for (const Projection projection : {Projection::Raw, Projection::Flat, Projection::Fit})
+  for (const Projection projection : {Projection::Raw, Projection::Flat, Projection::Fit, Projection::Signed})
     add({.series = "projection", .projection = projection, .samples = usual}, 1.0f);
   for (const float density : kDensities)
     add({.series = "density", .projection = options_.projection, .samples = usual}, density);
@@ -267,20 +270,15 @@ void Studying::compare(const std::vector<BakedPage>& pages, StudyPoint& point) c
     rnmMean += meanOf(truth_.maps[k]) / mapCount;
   }
   point.rnm = errorOf(rnm.square, rnmNoise_, rnm.mean, rnmMean);
-  std::size_t lit = 0;
-  std::size_t within = 0;
-  double claimed = 0.0;
-  for (std::size_t i = 0; i < maps.flat.size(); ++i) {
-    const auto expected = static_cast<double>(luminance(truth_.flat[i]));
-    const auto error = static_cast<double>(maps.standardError[i]);
-    claimed += error * error;
-    if (!(expected > kLit * mean)) continue;
-    ++lit;
-    within += std::abs(static_cast<double>(luminance(maps.flat[i])) - expected) <=
-              1.96 * std::hypot(error, static_cast<double>(truth_.standardError[i]));
-  }
-  if (lit > 0 && claimed > 0.0) point.withinInterval = static_cast<double>(within) / static_cast<double>(lit);
-  point.claimed = std::sqrt(claimed / static_cast<double>(std::max<std::size_t>(1, maps.flat.size()))) / mean;
+  const WithinInterval flatWithin =
+      withinInterval(maps.flat, maps.standardError, truth_.flat, truth_.standardError, kLit * mean);
+  WithinInterval rnmWithin;
+  for (std::size_t k = 0; k < maps.maps.size(); ++k)
+    rnmWithin += withinInterval(maps.maps[k], maps.mapErrors[k], truth_.maps[k], truth_.mapErrors[k], kLit * mean);
+  point.withinInterval = flatWithin.share();
+  point.withinRnm = rnmWithin.share();
+  point.claimed =
+      std::sqrt(flatWithin.claimed / static_cast<double>(std::max<std::size_t>(1, maps.flat.size()))) / mean;
   point.hasMaps = true;
 }
 

@@ -46,12 +46,13 @@ struct StudyPoint {
   double cpuSeconds = 0.0;  // the same on all threads
   bool hasMaps = false;     // flat, rnm and withinInterval are known: same texels and projection as the reference
   MapError flat{};
-  MapError rnm{};               // the three maps together
+  MapError rnm{};  // the three maps together
   // Share of lit texels within 1.96 standard errors (and the reference's); negative: too few samples tell of none.
   double withinInterval = -1.0;
-  double claimed = 0.0;         // root mean square of the standard errors, relative to the mean
-  double residual = -1.0;       // series "projection": RMS of decoded minus true light over normals within 30 degrees
-  double seen = -1.0;           // series "density": relative RMSE of bilinear lookups at the reference's texels
+  double withinRnm = -1.0;  // the same of the three maps together, by their own errors
+  double claimed = 0.0;     // root mean square of the flat map's standard errors, relative to the mean
+  double residual = -1.0;   // series "projection": RMS of decoded minus true light over normals within 30 degrees
+  double seen = -1.0;       // series "density": relative RMSE of bilinear lookups at the reference's texels
 };
 
 struct StudyReference {

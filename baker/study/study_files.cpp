@@ -32,14 +32,15 @@ double raysPerTexel(const StudyPoint& p) {
 std::string tableOfSamples(const Study& study) {
   std::string md =
       "| series | samples | rays / texel | CPU s | wall s | flat RMSE | flat bias | RNM RMSE | RNM bias | within "
-      "interval |\n|---|---|---|---|---|---|---|---|---|---|\n";
+      "interval: flat | RNM |\n|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const StudyPoint& p : study.points) {
     if (!p.hasMaps) continue;
     md += "| " + p.series + " | " + std::to_string(p.samples) + (p.quality.empty() ? "" : " (" + p.quality + ")") +
           " | " + format("%.0f", raysPerTexel(p)) + " | " + format("%.2f", p.cpuSeconds) + " | " +
           format("%.2f", p.seconds) + " | " + percent(p.flat.rmse) + " | " + format("%+.2f%%", 100.0 * p.flat.bias) +
           " | " + percent(p.rnm.rmse) + " | " + format("%+.2f%%", 100.0 * p.rnm.bias) + " | " +
-          (p.withinInterval >= 0.0 ? format("%.1f%%", 100.0 * p.withinInterval) : "-") + " |\n";
+          (p.withinInterval >= 0.0 ? format("%.1f%%", 100.0 * p.withinInterval) : "-") + " | " +
+          (p.withinRnm >= 0.0 ? format("%.1f%%", 100.0 * p.withinRnm) : "-") + " |\n";
   }
   return md;
 }
@@ -103,6 +104,7 @@ Json toJson(const StudyPoint& p) {
     json["rnm"] = {{"rmse", p.rnm.rmse}, {"bias", p.rnm.bias}};
     json["claimed"] = p.claimed;
     if (p.withinInterval >= 0.0) json["withinInterval"] = p.withinInterval;
+    if (p.withinRnm >= 0.0) json["withinIntervalRnm"] = p.withinRnm;
   }
   if (p.residual >= 0.0) json["residual"] = p.residual;
   if (p.seen >= 0.0) json["seen"] = p.seen;
@@ -114,7 +116,7 @@ Json toJson(const StudyPoint& p) {
 std::string studyCsv(const Study& study) {
   std::string csv =
       "series,quality,integrator,projection,samples,texels_per_meter,texels,rays,seconds,cpu_seconds,flat_rmse,"
-      "flat_bias,rnm_rmse,rnm_bias,claimed,within_interval,residual,seen\n";
+      "flat_bias,rnm_rmse,rnm_bias,claimed,within_interval,within_interval_rnm,residual,seen\n";
   for (const StudyPoint& p : study.points) {
     csv += p.series + "," + p.quality + "," + nameOf(p.integrator) + "," + nameOf(p.projection) + "," +
            std::to_string(p.samples) + "," + format("%.6g", static_cast<double>(p.texelsPerMeter)) + "," +
@@ -122,7 +124,7 @@ std::string studyCsv(const Study& study) {
            format("%.4f", p.cpuSeconds);
     for (const double v : {p.flat.rmse, p.flat.bias, p.rnm.rmse, p.rnm.bias, p.claimed})
       csv += "," + (p.hasMaps ? format("%.6g", v) : std::string());
-    for (const double v : {p.withinInterval, p.residual, p.seen})
+    for (const double v : {p.withinInterval, p.withinRnm, p.residual, p.seen})
       csv += "," + (v >= 0.0 ? format("%.6g", v) : std::string());
     csv += "\n";
   }
@@ -162,7 +164,7 @@ std::string studyMarkdown(const Study& study, const std::string& scene) {
         " (flat) and " + percent(r.rnmError) +
         " (RNM); this is taken off in quadrature below. RMSE and bias are relative to the mean over covered, valid "
         "texels. \"Within interval\" is the share of lit texels that differ from the reference by at most 1.96 of the "
-        "standard errors that both state; denoised bakes state those from before.\n\n" +
+        "standard errors that both state of their maps.\n\n" +
         tableOfSamples(study) + tableOfProjections(study) + tableOfDensities(study);
   if (!study.notes.empty()) md += "\n";
   for (const std::string& note : study.notes) md += "- " + note + "\n";

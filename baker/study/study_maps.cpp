@@ -1,6 +1,7 @@
 #include "baker/study/study_maps.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace lumel {
 
@@ -18,6 +19,7 @@ StudyMask validTexels(const std::vector<BakedPage>& pages) {
 StudyMaps mapsOf(const std::vector<BakedPage>& pages, const StudyMask& mask) {
   StudyMaps maps;
   if (!pages.empty()) maps.maps.resize(pages[0].maps.size());
+  maps.mapErrors.resize(maps.maps.size());
   for (std::size_t p = 0; p < pages.size(); ++p)
     for (std::size_t i = 0; i < mask[p].size(); ++i) {
       if (!mask[p][i]) continue;
@@ -25,7 +27,10 @@ StudyMaps mapsOf(const std::vector<BakedPage>& pages, const StudyMask& mask) {
         return Vec3(image.pixels[3 * i], image.pixels[3 * i + 1], image.pixels[3 * i + 2]);
       };
       maps.flat.push_back(pixel(pages[p].flat));
-      for (std::size_t k = 0; k < maps.maps.size(); ++k) maps.maps[k].push_back(pixel(pages[p].maps[k]));
+      for (std::size_t k = 0; k < maps.maps.size(); ++k) {
+        maps.maps[k].push_back(pixel(pages[p].maps[k]));
+        maps.mapErrors[k].push_back(pages[p].mapErrors.pixels[i * maps.maps.size() + k]);
+      }
       maps.standardError.push_back(pages[p].aux.pixels[4 * i + 2]);
     }
   return maps;
@@ -47,6 +52,28 @@ MapDifference differenceOf(const std::vector<Vec3>& a, const std::vector<Vec3>& 
     }
   const double count = 3.0 * static_cast<double>(std::max<std::size_t>(1, a.size()));
   return {d.square / count, d.mean / count};
+}
+
+void WithinInterval::operator+=(const WithinInterval& other) {
+  lit += other.lit;
+  within += other.within;
+  claimed += other.claimed;
+}
+
+WithinInterval withinInterval(const std::vector<Vec3>& map, const std::vector<float>& errors,
+                              const std::vector<Vec3>& truth, const std::vector<float>& truthErrors, double least) {
+  WithinInterval figures;
+  for (std::size_t i = 0; i < map.size(); ++i) {
+    const auto error = static_cast<double>(errors[i]);
+    if (!std::isfinite(error)) continue;
+    figures.claimed += error * error;
+    const auto expected = static_cast<double>(luminance(truth[i]));
+    if (!(expected > least)) continue;
+    ++figures.lit;
+    figures.within += std::abs(static_cast<double>(luminance(map[i])) - expected) <=
+                      1.96 * std::hypot(error, static_cast<double>(truthErrors[i]));
+  }
+  return figures;
 }
 
 }  // namespace lumel

@@ -35,6 +35,9 @@ constexpr float kLargestDistance = 6.0f;
 /// What a texel counts without its opposite, at a distance of one texel; it falls with the square of the distance, as
 /// does the square of the bend that it makes on a slope.
 constexpr float kUnpaired = 0.5f;
+/// What averaging bends of light, squared, by how far the averaged texels differ beyond their noise. Calibrated
+/// (README): most of it is slopes, of which symmetric weights bend nothing.
+constexpr float kBiasShare = 0.03f;
 /// Noise below this share of a texel's light is rounding. It is not more than that light either: stated errors are
 /// shared with the texels around, and dark ones beside bright ones would take from these.
 constexpr float kLeastRelativeError = 1e-5f;
@@ -48,6 +51,7 @@ struct Tile {
   std::vector<float> variance;                // of the flat map's luminance
   std::vector<std::vector<float>> flatByMap;  // that over the variance of each of the encoding's maps
   std::array<std::vector<float>, 3> normals;
+  std::vector<float> stated;  // variance of the flat map's luminance as it was handed over; 0: not known
   // Of all maps, the flat one first.
   std::vector<std::vector<float>> luminances;
   std::vector<std::vector<float>> colors;
@@ -58,17 +62,24 @@ struct Tile {
   }
 };
 
-/// The rows of the maps as they were: those above `firstKept` + kHalo have changed, of the last of them `kept` holds
-/// copies.
+/// The rows of the maps and of the flat one's errors as they were: those above `firstKept` + kHalo have changed, of the
+/// last of them `kept` and `keptErrors` hold copies.
 struct Rows {
   std::span<Image* const> maps;
-  std::vector<std::vector<float>> kept;  // kHalo rows
+  ErrorPlane errors;
+  std::vector<std::vector<float>> kept = {};  // kHalo rows
+  std::vector<float> keptErrors = {};
   std::ptrdiff_t firstKept = -kHalo;
 
   std::size_t rowSize() const { return static_cast<std::size_t>(maps[0]->width) * 3; }
   const float* row(std::size_t map, std::ptrdiff_t y) const {
     if (y >= firstKept + kHalo) return maps[map]->pixels.data() + static_cast<std::size_t>(y) * rowSize();
     return kept[map].data() + static_cast<std::size_t>(y - firstKept) * rowSize();
+  }
+  ErrorPlane errorRow(std::ptrdiff_t y) {
+    const auto width = static_cast<std::size_t>(maps[0]->width);
+    if (y >= firstKept + kHalo) return {&errors[static_cast<std::size_t>(y) * width], errors.stride};
+    return {keptErrors.data() + static_cast<std::size_t>(y - firstKept) * width, 1};
   }
   /// Before rows up to `last`, all of them after those that are kept, change. They must be at least kHalo.
   void keepBefore(std::ptrdiff_t last) {
@@ -78,6 +89,10 @@ struct Rows {
       const float* from = maps[m]->pixels.data() + static_cast<std::size_t>(firstKept) * rowSize();
       kept[m].assign(from, from + kHalo * rowSize());
     }
+    const auto width = static_cast<std::size_t>(maps[0]->width);
+    keptErrors.resize(kHalo * width);
+    for (std::size_t i = 0; i < keptErrors.size(); ++i)
+      keptErrors[i] = errors[static_cast<std::size_t>(firstKept) * width + i];
   }
 };
 
@@ -85,12 +100,10 @@ struct Rows {
 struct Judged {
   std::span<const std::uint32_t> chartIds;
   std::span<const CoarseNormal> normals;
-  std::span<const float> errors;
-  std::size_t stride;
 };
 
-Tile readTile(const Rows& from, const Judged& judged, std::ptrdiff_t firstRow, std::size_t rows,
-              std::ptrdiff_t firstColumn, std::size_t columns) {
+Tile readTile(Rows& from, const Judged& judged, std::ptrdiff_t firstRow, std::size_t rows, std::ptrdiff_t firstColumn,
+              std::size_t columns) {
   const std::ptrdiff_t width = from.maps[0]->width;
   const std::ptrdiff_t height = from.maps[0]->height;
   Tile tile;
@@ -103,6 +116,7 @@ Tile readTile(const Rows& from, const Judged& judged, std::ptrdiff_t firstRow, s
   const std::size_t maps = from.maps.size();
   tile.flatByMap.assign(maps - 1, std::vector<float>(count, 1.0f / kMapVariance));
   for (auto& plane : tile.normals) plane.assign(count, 0.0f);
+  tile.stated.assign(count, 0.0f);
   tile.luminances.assign(maps, std::vector<float>(count, 0.0f));
   tile.colors.assign(3 * maps, std::vector<float>(count, 0.0f));
   const std::ptrdiff_t left = std::max<std::ptrdiff_t>(0, firstColumn - kHalo);
@@ -112,6 +126,7 @@ Tile readTile(const Rows& from, const Judged& judged, std::ptrdiff_t firstRow, s
     if (y < 0 || y >= height) continue;
     std::array<const float*, 1 + kMostMaps> pixels{};
     for (std::size_t m = 0; m < maps; ++m) pixels[m] = from.row(m, y);
+    const ErrorPlane errors = from.errorRow(y);
     for (std::ptrdiff_t x = left; x < right; ++x) {
       const auto source = static_cast<std::size_t>(y * width + x);
       if (judged.chartIds[source] == 0) continue;
@@ -124,8 +139,10 @@ Tile readTile(const Rows& from, const Judged& judged, std::ptrdiff_t firstRow, s
         for (std::size_t c = 0; c < 3; ++c) tile.colors[m * 3 + c][to] = pixel[c];
         tile.luminances[m][to] = luminance(Vec3(pixel[0], pixel[1], pixel[2]));
       }
+      const float stated = errors[static_cast<std::size_t>(x)];
+      if (std::isfinite(stated)) tile.stated[to] = stated * stated;
       const float light = tile.luminances[0][to];
-      const float error = std::max(std::min(judged.errors[source * judged.stride], light), kLeastRelativeError * light);
+      const float error = std::max(std::min(std::isfinite(stated) ? stated : 0.0f, light), kLeastRelativeError * light);
       tile.variance[to] += error * error;
     }
   }
@@ -311,6 +328,8 @@ Agreements::Agreements(const Tile& tile, int dx, int dy)
 struct Sums {
   std::vector<float> weight;
   std::vector<std::vector<float>> colors;
+  std::vector<float> variance;             // squared weights times stated variances
+  std::vector<std::vector<float>> spread;  // per map: weights times squared differences from the texel's own luminance
 };
 
 /// Adds to every texel of the tile the two that lie (dx, dy) and (-dx, -dy) from it, dy >= 0, as far as the patches of
@@ -345,6 +364,22 @@ LUMEL_FOR_EACH_CPU void addPair(const Tile& tile, int dx, int dy, Sums& sums) {
         sum[k] += next + last;
       }
     }
+    const float* stated = tile.stated.data() + here;
+    float* variance = sums.variance.data() + to;
+    for (std::size_t k = 0; k < width; ++k) {
+      const auto x = static_cast<std::ptrdiff_t>(k);
+      variance[k] += aheads[k] * aheads[k] * stated[x + shift] + behinds[k] * behinds[k] * stated[x - shift];
+    }
+    for (std::size_t m = 0; m < tile.maps(); ++m) {
+      const float* light = tile.luminances[m].data() + here;
+      float* spread = sums.spread[m].data() + to;
+      for (std::size_t k = 0; k < width; ++k) {
+        const auto x = static_cast<std::ptrdiff_t>(k);
+        const float next = light[x + shift] - light[x], last = light[x - shift] - light[x];
+        spread[k] += (aheads[k] > 0.0f ? aheads[k] * (next * next) : 0.0f) +
+                     (behinds[k] > 0.0f ? behinds[k] * (last * last) : 0.0f);
+      }
+    }
   }
 }
 
@@ -354,12 +389,15 @@ Sums averageTile(const Tile& tile) {
   const std::size_t count = width * tile.rows;
   sums.weight.assign(count, 0.0f);
   sums.colors.assign(tile.colors.size(), std::vector<float>(count, 0.0f));
+  sums.variance.assign(count, 0.0f);
+  sums.spread.assign(tile.maps(), std::vector<float>(count, 0.0f));
   for (std::size_t row = 0; row < tile.rows; ++row) {
     const std::size_t here = tile.at(static_cast<std::ptrdiff_t>(row), 0);
     for (std::size_t x = 0; x < width; ++x) {
       if (tile.charts[here + x] == 0) continue;
       sums.weight[row * width + x] = 1.0f;
       for (std::size_t c = 0; c < tile.colors.size(); ++c) sums.colors[c][row * width + x] = tile.colors[c][here + x];
+      sums.variance[row * width + x] = tile.stated[here + x];
     }
   }
   for (int dy = 0; dy <= kRadius; ++dy)
@@ -372,7 +410,27 @@ struct Averages {
   std::size_t width;
   std::size_t firstRow;  // of the strip
   std::vector<std::vector<float>> strip;
+  std::vector<std::vector<float>> errors;
 };
+
+/// Errors of averages: what the weights leave of the noise, and a share of how far the averaged texels differ beyond it
+/// (README, "Errors of what is delivered"). `own`: the texel's entry in the tile with its margin, `i` that in the sums,
+/// `pixel` that in the strip.
+void storeErrors(const Tile& tile, const Sums& sums, std::size_t own, std::size_t i, std::size_t pixel, Averages& to) {
+  const float weight = sums.weight[i];
+  const float left = sums.variance[i] / (weight * weight);
+  // The texels differ by their noise in the other maps as they do in the flat one.
+  const float share = tile.stated[own] > 0.0f ? left / tile.stated[own] : 1.0f;
+  for (std::size_t m = 0; m < tile.maps(); ++m) {
+    float& error = to.errors[m][pixel];
+    if (!std::isfinite(error)) continue;
+    const float* color = to.strip[m].data() + 3 * pixel;
+    const float moved = luminance(Vec3(color[0], color[1], color[2])) - tile.luminances[m][own];
+    const float spread = sums.spread[m][i] / weight - moved * moved;
+    const float variance = error * error;
+    error = std::sqrt(variance * share + kBiasShare * std::max(spread - variance * (1.0f - share), 0.0f));
+  }
+}
 
 /// (row, column): of the tile on the page.
 void storeTile(const Tile& tile, const Sums& sums, std::size_t row, std::size_t column, Averages& to) {
@@ -384,22 +442,26 @@ void storeTile(const Tile& tile, const Sums& sums, std::size_t row, std::size_t 
       const std::size_t pixel = 3 * (texel - to.firstRow * to.width);
       for (std::size_t c = 0; c < sums.colors.size(); ++c)
         to.strip[c / 3][pixel + c % 3] = sums.colors[c][i] / sums.weight[i];
+      storeErrors(tile, sums, tile.at(static_cast<std::ptrdiff_t>(y), static_cast<std::ptrdiff_t>(x)), i,
+                  texel - to.firstRow * to.width, to);
     }
 }
 
 /// Averages the texels of a page.
-void averagePage(std::span<Image* const> maps, const Judged& judged) {
+void averagePage(std::span<Image* const> maps, std::span<const ErrorPlane> errors, const Judged& judged) {
   const auto width = static_cast<std::size_t>(maps[0]->width);
   const auto height = static_cast<std::size_t>(maps[0]->height);
   const std::size_t tilesPerRow = (width + kTileColumns - 1) / kTileColumns;
-  Rows before{maps, {}};
-  Averages to{width, 0, std::vector<std::vector<float>>(maps.size())};
+  Rows before{maps, errors[0]};
+  Averages to{width, 0, std::vector<std::vector<float>>(maps.size()), std::vector<std::vector<float>>(maps.size())};
   for (std::size_t first = 0; first < height; first += kStripRows) {
     const std::size_t last = std::min(height, first + kStripRows);
     to.firstRow = first;
     for (std::size_t m = 0; m < maps.size(); ++m) {
       const auto from = maps[m]->pixels.begin() + static_cast<std::ptrdiff_t>(first * width * 3);
       to.strip[m].assign(from, from + static_cast<std::ptrdiff_t>((last - first) * width * 3));
+      to.errors[m].resize((last - first) * width);
+      for (std::size_t i = 0; i < to.errors[m].size(); ++i) to.errors[m][i] = errors[m][first * width + i];
     }
     const std::size_t tiles = tilesPerRow * ((last - first + kTileRows - 1) / kTileRows);
     parallelFor(tiles, 1, [&](std::size_t begin, std::size_t end) {
@@ -413,9 +475,11 @@ void averagePage(std::span<Image* const> maps, const Judged& judged) {
       }
     });
     if (last < height) before.keepBefore(static_cast<std::ptrdiff_t>(last));
-    for (std::size_t m = 0; m < maps.size(); ++m)
+    for (std::size_t m = 0; m < maps.size(); ++m) {
       std::copy(to.strip[m].begin(), to.strip[m].end(),
                 maps[m]->pixels.begin() + static_cast<std::ptrdiff_t>(first * width * 3));
+      for (std::size_t i = 0; i < to.errors[m].size(); ++i) errors[m][first * width + i] = to.errors[m][i];
+    }
   }
 }
 
@@ -451,9 +515,9 @@ void restoreLight(std::span<Image* const> maps, std::span<const std::uint32_t> c
 }  // namespace
 
 void denoise(Image& flat, std::span<Image> encoded, std::span<const std::uint32_t> chartIds,
-             std::span<const CoarseNormal> normals, std::span<const float> standardError, std::size_t stride) {
+             std::span<const CoarseNormal> normals, std::span<const ErrorPlane> errors) {
   const std::size_t count = static_cast<std::size_t>(flat.width) * static_cast<std::size_t>(flat.height);
-  LUMEL_CHECK(chartIds.size() == count && standardError.size() + stride > count * stride);
+  LUMEL_CHECK(chartIds.size() == count && errors.size() == 1 + encoded.size());
   LUMEL_CHECK(!encoded.empty() && encoded.size() <= kMostMaps);
   std::vector<Image*> maps{&flat};
   for (Image& map : encoded) maps.push_back(&map);
@@ -461,7 +525,7 @@ void denoise(Image& flat, std::span<Image> encoded, std::span<const std::uint32_
     LUMEL_CHECK(map->width == flat.width && map->height == flat.height && map->channels == 3);
   if (chartIds.empty()) return;
   const std::vector<double> light = lightOfCharts(flat, chartIds);
-  averagePage(maps, {chartIds, normals, standardError, stride});
+  averagePage(maps, errors, {chartIds, normals});
   restoreLight(maps, chartIds, light);
 }
 

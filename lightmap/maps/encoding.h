@@ -79,9 +79,11 @@ class Encoding {
   const Traits traits_;
 };
 
-/// The three RNM maps. `projection` is how light is spread over them, `decode` how readers weigh them.
-std::shared_ptr<const Encoding> rnmEncoding(Projection projection = Projection::Flat,
-                                            RnmDecode decode = RnmDecode::Squared);
+/// The three RNM maps. `projection` is how light is spread over them, `decode` how readers weigh them; without one it
+/// is the projection's own: linear for signed dots, of which it gives back max(0, N.w) where it sees all three, else
+/// squared.
+std::shared_ptr<const Encoding> rnmEncoding(Projection projection, RnmDecode decode);
+std::shared_ptr<const Encoding> rnmEncoding(Projection projection = Projection::Flat);
 /// The flat map as an encoding of its own: the same light on every normal.
 std::shared_ptr<const Encoding> flatEncoding();
 /// Two bands of spherical harmonics: L0 and the vector (Lx, Ly, Lz), with which irradiance / pi is L0 + N.L. Exact for

@@ -19,6 +19,16 @@ LUMEL_FOR_EACH_CPU void clampedDots(const float* x, const float* y, const float*
   }
 }
 
+LUMEL_FOR_EACH_CPU void plainDots(const float* x, const float* y, const float* z, KernelLanes& lanes) {
+  for (std::size_t lane = 0; lane < kKernelLanes; ++lane) {
+    const Vec3 dir(x[lane], y[lane], z[lane]);
+    const float above = dir.z > 0.0f ? 1.0f : 0.0f;
+    lanes.of[0][lane] = above * glm::dot(dir, kRnmBasis[0]);
+    lanes.of[1][lane] = above * glm::dot(dir, kRnmBasis[1]);
+    lanes.of[2][lane] = above * glm::dot(dir, kRnmBasis[2]);
+  }
+}
+
 std::string describeRnmBasis() {
   std::string basis;
   for (std::size_t i = 0; i < kRnmBasis.size(); ++i) {
@@ -47,10 +57,13 @@ class RnmEncoding : public Encoding {
   RnmEncoding(Projection projection, RnmDecode decode)
       : Encoding({.name = "rnm",
                   .mapNames = {"rnm0", "rnm1", "rnm2"},
+                  .isSigned = projection == Projection::Signed,
                   .conventions = {{"basis", describeRnmBasis()},
                                   {"order", "map i belongs to Bi; a frame of the other handedness swaps maps 1 and 2"},
                                   {"decode", nameOf(decode)},
-                                  {"decodeFormula", std::string("L = sum w_i map_i, w_i = ") + weightsOf(decode)},
+                                  {"decodeFormula", (projection == Projection::Signed ? "L = max(0, sum w_i map_i)"
+                                                                                      : "L = sum w_i map_i") +
+                                                        std::string(", w_i = ") + weightsOf(decode)},
                                   {"projection", nameOf(projection)}}}),
         kernels_(projection),
         projection_(projection),
@@ -63,6 +76,8 @@ class RnmEncoding : public Encoding {
   void laneKernels(const float* x, const float* y, const float* z, KernelLanes& lanes) const override {
     if (kernels_.clampedDots())
       clampedDots(x, y, z, lanes);
+    else if (kernels_.plainDots())
+      plainDots(x, y, z, lanes);
     else
       Encoding::laneKernels(x, y, z, lanes);
   }
@@ -71,7 +86,8 @@ class RnmEncoding : public Encoding {
     std::copy(finished.begin(), finished.end(), maps.begin());
   }
   Vec3 decode(std::span<const Vec3> maps, const Vec3& normalTangent) const override {
-    return decodeRnm({maps[0], maps[1], maps[2]}, normalTangent, decode_);
+    const Vec3 light = decodeRnm({maps[0], maps[1], maps[2]}, normalTangent, decode_);
+    return isSigned() ? glm::max(light, Vec3(0.0f)) : light;
   }
 
  private:
@@ -136,7 +152,8 @@ Expected<std::shared_ptr<const Encoding>> statedRnm(const Conventions& conventio
   const auto decode = named(decodeName, {RnmDecode::Squared, RnmDecode::Linear, RnmDecode::LinearNormalized});
   if (!decode) return inputError("'" + decodeName + "' is not a decode of rnm that this version knows");
   const std::string projectionName = stated(conventions, "projection", nameOf(Projection::Flat));
-  const auto projection = named(projectionName, {Projection::Raw, Projection::Flat, Projection::Fit});
+  const auto projection =
+      named(projectionName, {Projection::Raw, Projection::Flat, Projection::Fit, Projection::Signed});
   if (!projection) return inputError("'" + projectionName + "' is not a projection of rnm that this version knows");
   return rnmEncoding(*projection, *decode);
 }
@@ -166,6 +183,9 @@ void Encoding::finish(std::span<Vec3>, const Vec3&) const {}
 
 std::shared_ptr<const Encoding> rnmEncoding(Projection projection, RnmDecode decode) {
   return std::make_shared<RnmEncoding>(projection, decode);
+}
+std::shared_ptr<const Encoding> rnmEncoding(Projection projection) {
+  return rnmEncoding(projection, projection == Projection::Signed ? RnmDecode::Linear : RnmDecode::Squared);
 }
 std::shared_ptr<const Encoding> flatEncoding() { return std::make_shared<FlatEncoding>(); }
 std::shared_ptr<const Encoding> sh1Encoding() { return std::make_shared<Sh1Encoding>(); }

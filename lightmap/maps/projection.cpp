@@ -116,6 +116,8 @@ const char* nameOf(Projection projection) {
       return "flat";
     case Projection::Fit:
       return "fit";
+    case Projection::Signed:
+      return "signed";
   }
   return "?";
 }
@@ -143,8 +145,8 @@ Vec3 RnmKernels::operator()(const Vec3& dirTangent) const {
   if (!(dirTangent.z > 0)) return Vec3(0.0f);
   if (projection_ == Projection::Fit) return fitKernels(matrix_, table_, dirTangent);
   Vec3 k;
-  for (int i = 0; i < 3; ++i) k[i] = std::max(0.0f, glm::dot(dirTangent, kRnmBasis[static_cast<std::size_t>(i)]));
-  return k;
+  for (int i = 0; i < 3; ++i) k[i] = glm::dot(dirTangent, kRnmBasis[static_cast<std::size_t>(i)]);
+  return projection_ == Projection::Signed ? k : glm::max(k, Vec3(0.0f));
 }
 
 std::array<Vec3, 3> finishTexel(Projection projection, const std::array<Vec3, 3>& rnm, const Vec3& flat) {

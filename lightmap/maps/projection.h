@@ -11,23 +11,27 @@
 namespace lumel {
 
 enum class Projection {
-  Raw,   // K_i = max(0, w.B_i)
-  Flat,  // raw, then scaled per texel and colour so that the maps' mean is the flat irradiance / pi (default)
-  Fit,   // least squares for the squared decode over normals within 30 degrees of flat, non-negative, exact at flat
+  Raw,     // K_i = max(0, w.B_i)
+  Flat,    // raw, then scaled per texel and colour so that the maps' mean is the flat irradiance / pi (default)
+  Fit,     // least squares for the squared decode over normals within 30 degrees of flat, non-negative, exact at flat
+  Signed,  // K_i = w.B_i, for the linear decode: maps may be negative
 };
-const char* nameOf(Projection projection);  // "raw", "flat", "fit"
+const char* nameOf(Projection projection);  // "raw", "flat", "fit", "signed"
 
 /// Evaluates the three kernels for a unit direction in tangent space. Directions with w.z <= 0 (below the surface)
 /// give zero: light comes from above the surface only. Fit interpolates a table, within 5e-4 of the exact kernels; its
-/// three add up to 3 w.z to rounding. Flat's kernels are Raw's (finishTexel does the rest).
+/// three add up to 3 w.z to rounding; those of Signed to sqrt(3) w.z. Flat's kernels are Raw's (finishTexel does the
+/// rest).
 class RnmKernels {
  public:
   explicit RnmKernels(Projection projection);
   Vec3 operator()(const Vec3& dirTangent) const;
   /// Whether the kernels are max(0, w.B_i) above the surface, so that a caller may compute them in place.
-  bool clampedDots() const { return projection_ != Projection::Fit; }
+  bool clampedDots() const { return projection_ == Projection::Raw || projection_ == Projection::Flat; }
+  /// The same without the max.
+  bool plainDots() const { return projection_ == Projection::Signed; }
 
-  /// An upper bound of every kernel over the hemisphere (for sampling densities and for tests).
+  /// An upper bound of every kernel's size over the hemisphere (for sampling densities and for tests).
   float bound() const { return bound_; }
 
  private:
@@ -39,7 +43,7 @@ class RnmKernels {
 };
 
 /// What becomes of a texel's three sums: for Flat, scales rnm so that its mean is `flat` in each colour (where the
-/// mean is zero: each map = flat). Raw and Fit return their input.
+/// mean is zero: each map = flat). The others return their input.
 std::array<Vec3, 3> finishTexel(Projection projection, const std::array<Vec3, 3>& rnm, const Vec3& flat);
 
 /// The light that a consumer decodes for a tangent-space normal: sum of w_i * maps[i].

@@ -28,7 +28,7 @@ Directional fromMaps(std::span<const float> maps) {
   return light;
 }
 
-void toMaps(const Directional& light, std::span<float> maps) {
+void toMaps(const Directional& light, bool isSigned, std::span<float> maps) {
   const double scalar = std::max(light.scalar, 0.0);
   maps[0] = static_cast<float>(scalar);
   if (maps.size() == 4)
@@ -39,7 +39,8 @@ void toMaps(const Directional& light, std::span<float> maps) {
   for (std::size_t i = 0; i < 3; ++i) {
     // The basis is orthonormal, and the mean is the part along the normal over sqrt(3).
     const float along = light.vector.x * kRnmBasis[i].x + light.vector.y * kRnmBasis[i].y;
-    values[i] = std::max(scalar + static_cast<double>(along), 0.0);
+    values[i] = scalar + static_cast<double>(along);
+    if (!isSigned) values[i] = std::max(values[i], 0.0);
     sum += values[i];
   }
   for (std::size_t i = 0; i < 3; ++i)
@@ -72,7 +73,7 @@ void writeLight(const SeamLight& light, const Frame& frame, std::uint32_t texel,
     page.flat->pixels[pixel + c] = static_cast<float>(std::max(light.values[c], 0.0));
     const Vec3 world(light.values[6 + 3 * c], light.values[7 + 3 * c], light.values[8 + 3 * c]);
     std::array<float, kMostMendable> maps{};
-    toMaps({light.values[3 + c], frame.toLocal(world)}, std::span(maps).first(page.maps.size()));
+    toMaps({light.values[3 + c], frame.toLocal(world)}, page.isSigned, std::span(maps).first(page.maps.size()));
     for (std::size_t i = 0; i < page.maps.size(); ++i) page.maps[i].pixels[pixel + c] = maps[i];
   }
 }

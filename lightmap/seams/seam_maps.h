@@ -31,6 +31,7 @@ struct SeamPage {
   std::span<const float> errors;     // standard error of the flat map's luminance, `stride` floats apart
   std::span<const float> coverages;  // share of the texel's area, as far apart
   std::size_t stride = 1;
+  bool isSigned = false;  // whether maps may be negative
 };
 
 /// An empty texel that a lookup at a seam reads; what it should hold lies on the other side.
@@ -65,8 +66,8 @@ struct SeamFigures {
 /// After continueLight: solves for the texels that lookups at the seams read, so that both sides agree: weighted least
 /// squares, in which known texels stay near their values by their standard error and those beyond near what continues
 /// there. All maps and colours get the same matrix, so what holds for them linearly goes on to hold; where bake frames
-/// differ, the directional part (sum of map_i B_i, along the surface) agrees in world space. Results are not negative.
-/// Deterministic for any number of threads.
+/// differ, the directional part (sum of map_i B_i, along the surface) agrees in world space. Results are not negative
+/// but for maps that may be. Deterministic for any number of threads.
 SeamFigures mendSeams(const Seams& seams, std::span<const BeyondTexel> beyond, std::span<SeamPage> pages);
 
 }  // namespace lumel

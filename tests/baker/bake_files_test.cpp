@@ -30,6 +30,7 @@ struct Fixture {
       page.maps.assign(record.bakeOptions.encoding->mapCount(), Image(8, 4, 3, value));
       page.flat = Image(8, 4, 3, value);
       page.aux = Image(8, 4, 4, 1.0f);
+      page.mapErrors = Image(8, 4, static_cast<int>(page.maps.size()), 0.25f);
       result.pages.push_back(page);
       atlas.atlas.pages.push_back({8, 4});
     }

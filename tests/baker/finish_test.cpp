@@ -21,6 +21,7 @@ struct Fixture {
     page.maps.assign(3, Image(6, 1, 3));
     page.flat = Image(6, 1, 3);
     page.aux = Image(6, 1, 4);
+    page.mapErrors = Image(6, 1, 3);
     for (const auto& [x, triangle, light, validity] : {std::tuple(0, 0u, 1.0f, 1.0f), std::tuple(1, 0u, 3.0f, 0.6f),
                                                        std::tuple(2, 0u, 0.0f, 0.4f), std::tuple(4, 1u, 0.25f, 0.0f)}) {
       t.coords.push_back({static_cast<std::uint16_t>(x), 0});
@@ -30,6 +31,8 @@ struct Fixture {
       page.flat.setRgb(x, 0, Vec3(light));
       page.aux.at(x, 0)[0] = 1.0f;
       page.aux.at(x, 0)[1] = validity;
+      page.aux.at(x, 0)[2] = 0.1f * light;
+      for (int map = 0; map < 3; ++map) page.mapErrors.at(x, 0)[map] = 0.2f * light;
     }
     t.firstTriangle.push_back(static_cast<std::uint32_t>(t.triangles.size()));
   }
@@ -37,7 +40,7 @@ struct Fixture {
 
 TEST(Finish, InvalidTexelsTakeTheLightOfTheirChart) {
   Fixture f;
-  const Image auxBefore = f.pages[0].aux;
+  Image auxBefore = f.pages[0].aux;
   finishPages(f.pages, f.atlas, f.texels, {});
   for (const Image* map : {&f.pages[0].maps[0], &f.pages[0].maps[2], &f.pages[0].flat}) {
     EXPECT_EQ(map->rgb(0, 0).x, 1.0f);
@@ -46,6 +49,9 @@ TEST(Finish, InvalidTexelsTakeTheLightOfTheirChart) {
     EXPECT_EQ(map->rgb(3, 0).x, 0.0f);   // nobody's: no border without dilation
     EXPECT_EQ(map->rgb(4, 0).x, 0.25f);  // its chart knows nothing better
   }
+  // Errors go with the light; what else is known stays.
+  EXPECT_EQ(f.pages[0].mapErrors.at(2, 0)[1], 0.2f * 3.0f);
+  auxBefore.at(2, 0)[2] = 0.1f * 3.0f;
   EXPECT_EQ(f.pages[0].aux.pixels, auxBefore.pixels);
 }
 
@@ -70,6 +76,8 @@ TEST(Finish, DilationGrowsBeyondWhatIsCovered) {
   finishPages(f.pages, f.atlas, f.texels, {.rings = 1});
   EXPECT_EQ(f.pages[0].flat.rgb(3, 0).x, (3.0f + 0.25f) / 2);
   EXPECT_EQ(f.pages[0].flat.rgb(5, 0).x, 0.25f);
+  EXPECT_EQ(f.pages[0].mapErrors.at(5, 0)[2], 0.2f * 0.25f);
+  EXPECT_EQ(f.pages[0].aux.at(5, 0)[0], 0.0f);
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ struct SessionRoom {
 };
 
 inline std::vector<const Image*> imagesOf(const BakedPage& page) {
-  std::vector<const Image*> images = {&page.flat, &page.aux};
+  std::vector<const Image*> images = {&page.flat, &page.aux, &page.mapErrors};
   for (const Image& map : page.maps) images.push_back(&map);
   return images;
 }

@@ -166,7 +166,9 @@ bool sameBytes(const BakeResult& a, const BakeResult& b) {
     if (a.pages[p].maps.size() != b.pages[p].maps.size()) return false;
     for (std::size_t i = 0; i < a.pages[p].maps.size(); ++i)
       if (!sameBytes(a.pages[p].maps[i], b.pages[p].maps[i])) return false;
-    if (!sameBytes(a.pages[p].flat, b.pages[p].flat) || !sameBytes(a.pages[p].aux, b.pages[p].aux)) return false;
+    if (!sameBytes(a.pages[p].flat, b.pages[p].flat) || !sameBytes(a.pages[p].aux, b.pages[p].aux) ||
+        !sameBytes(a.pages[p].mapErrors, b.pages[p].mapErrors))
+      return false;
   }
   return a.stats.rays == b.stats.rays && a.stats.shadowRays == b.stats.shadowRays &&
          a.stats.meanFlat == b.stats.meanFlat && a.stats.projectionResidual == b.stats.projectionResidual;

@@ -69,7 +69,7 @@ TEST(ExitCodes, WrongCommandLineIs2) {
   EXPECT_TRUE(fails(bake({"--sky-color", "1", "2"}), 2, {"--sky-color", "3"}));
   EXPECT_TRUE(fails(bake({"--sky-color", "1", "-2", "0"}), 2, {"--sky-color", "-2"}));
   EXPECT_TRUE(fails(bake({"--page-size", "30"}), 2, {"--page-size", "multiple of 4"}));
-  EXPECT_TRUE(fails(bake({"--projection", "round"}), 2, {"--projection", "raw|flat|fit"}));
+  EXPECT_TRUE(fails(bake({"--projection", "round"}), 2, {"--projection", "raw|flat|fit|signed"}));
   EXPECT_TRUE(fails(bake({"--target-error", "200%"}), 2, {"--target-error", "200%", "0% to 50%"}));
   EXPECT_TRUE(fails(bake({"--target-error", "1"}), 2, {"--target-error", "1 is", "0% to 50%"}));  // 1% is meant
   EXPECT_TRUE(fails(run({"bkae"}), 2, {"unknown command 'bkae'", "bake"}));

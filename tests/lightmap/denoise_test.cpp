@@ -23,9 +23,11 @@ struct Page {
   std::vector<std::uint32_t> charts = std::vector<std::uint32_t>(kSide * kSide, 1);
   std::vector<CoarseNormal> normals = std::vector<CoarseNormal>(kSide * kSide, kUp);
   std::vector<float> errors;
+  std::array<std::vector<float>, 3> rnmErrors;
 
   template <class Truth>
   Page(const Truth& truth, float sigma, float rnmNoise = 1.4f) : errors(kSide * kSide, sigma) {
+    rnmErrors.fill(std::vector<float>(kSide * kSide, rnmNoise * sigma));
     std::mt19937 random(5);
     std::normal_distribution<float> noise(0.0f, 1.0f);
     for (int y = 0; y < kSide; ++y)
@@ -34,7 +36,11 @@ struct Page {
         for (Image& map : rnm) map.setRgb(x, y, Vec3(truth(x, y) + rnmNoise * sigma * noise(random)));
       }
   }
-  void denoise() { lumel::denoise(flat, rnm, charts, normals, errors); }
+  void denoise() {
+    const std::array<ErrorPlane, 4> planes = {
+        {{errors.data()}, {rnmErrors[0].data()}, {rnmErrors[1].data()}, {rnmErrors[2].data()}}};
+    lumel::denoise(flat, rnm, charts, normals, planes);
+  }
 };
 
 template <class Truth>
@@ -255,6 +261,47 @@ TEST(Denoise, SameBytesForAnyThreadCount) {
   EXPECT_EQ(one.rnm[2].pixels, four.rnm[2].pixels);
 }
 
+/// Share of texels whose truth lies within 1.96 of the errors that are stated of the result.
+template <class Truth>
+double coverage(const Image& map, const std::vector<float>& errors, const Truth& truth) {
+  int within = 0;
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x)
+      within += std::abs(map.rgb(x, y).x - truth(x, y)) <= 1.96f * errors[static_cast<std::size_t>(y * kSide + x)];
+  return static_cast<double>(within) / (kSide * kSide);
+}
+
+// On a page of about 60 independent means of 80 texels, so single pages scatter by some per cent.
+TEST(Denoise, StatesTheErrorsOfItsResult) {
+  const auto slope = [](int x, int y) {
+    return 1.0f + 0.004f * static_cast<float>(x) + 0.002f * static_cast<float>(y);
+  };
+  Page page(slope, 0.1f);
+  page.denoise();
+  EXPECT_NEAR(coverage(page.flat, page.errors, slope), 0.95, 0.04);
+  EXPECT_NEAR(coverage(page.rnm[0], page.rnmErrors[0], slope), 0.95, 0.04);
+  double flat = 0, rnm = 0;
+  for (std::size_t i = 0; i < page.errors.size(); ++i) {
+    flat += static_cast<double>(page.errors[i] * page.errors[i]) / (kSide * kSide);
+    rnm += static_cast<double>(page.rnmErrors[0][i] * page.rnmErrors[0][i]) / (kSide * kSide);
+  }
+  // Within a third of what is measured, which is a fifth of what came in.
+  EXPECT_NEAR(std::sqrt(flat) / rmsError(page.flat, slope), 1.0, 0.33);
+  EXPECT_NEAR(std::sqrt(rnm) / rmsError(page.rnm[0], slope), 1.0, 0.33);
+}
+
+TEST(Denoise, WhatIsNotKnownStaysSo) {
+  const auto truth = [](int, int) { return 1.0f; };
+  Page page(truth, 0.1f);
+  page.errors[100] = page.rnmErrors[1][200] = std::numeric_limits<float>::quiet_NaN();
+  page.denoise();
+  for (std::size_t i = 0; i < page.errors.size(); ++i) {
+    EXPECT_EQ(std::isfinite(page.errors[i]), i != 100) << i;
+    EXPECT_EQ(std::isfinite(page.rnmErrors[1][i]), i != 200) << i;
+    EXPECT_TRUE(std::isfinite(page.flat.pixels[3 * i])) << i;
+  }
+}
+
 /// Pages are worked on in tiles, rows above a strip of them have changed already: neither may be seen.
 TEST(Denoise, PlaceOnThePageDoesNotMatter) {
   constexpr int kWidth = 290;
@@ -265,7 +312,8 @@ TEST(Denoise, PlaceOnThePageDoesNotMatter) {
     Image flat(width, height, 3);
     std::array<Image, 3> rnm = {flat, flat, flat};
     std::vector<std::uint32_t> charts(flat.pixels.size() / 3, 0);
-    const std::vector<float> errors(charts.size() * 2, 0.2f);
+    std::vector<float> errors(charts.size() * 2, 0.2f);
+    std::vector<float> others = errors;
     std::mt19937 random(7);
     std::normal_distribution<float> noise(1.0f, 0.2f);
     for (int y = top; y < top + kHeight; ++y)
@@ -273,10 +321,13 @@ TEST(Denoise, PlaceOnThePageDoesNotMatter) {
         charts[static_cast<std::size_t>(y * width + x)] = 1;
         for (Image* map : {&flat, &rnm[0], &rnm[1], &rnm[2]}) map->setRgb(x, y, Vec3(noise(random)));
       }
-    denoise(flat, rnm, charts, std::vector<CoarseNormal>(charts.size(), kUp), errors, 2);
+    const ErrorPlane other{others.data(), 2};
+    denoise(flat, rnm, charts, std::vector<CoarseNormal>(charts.size(), kUp),
+            std::array<ErrorPlane, 4>{{{errors.data(), 2}, other, other, other}});
     std::vector<float> values;
     for (int y = top; y < top + kHeight; ++y)
-      for (int x = left; x < left + kWidth; ++x) values.push_back(flat.rgb(x, y).x + rnm[2].rgb(x, y).x);
+      for (int x = left; x < left + kWidth; ++x)
+        values.push_back(flat.rgb(x, y).x + rnm[2].rgb(x, y).x + errors[static_cast<std::size_t>(2 * (y * width + x))]);
     return values;
   };
   const std::vector<float> values = denoisedAt(0, 0);
@@ -289,8 +340,11 @@ TEST(Denoise, PagesSmallerThanThePatch) {
     Image flat(side, side, 3, 0.5f);
     std::array<Image, 3> rnm = {flat, flat, flat};
     const std::vector<std::uint32_t> charts(flat.pixels.size() / 3, 1);
-    const std::vector<float> errors(charts.size(), 0.1f);
-    denoise(flat, rnm, charts, std::vector<CoarseNormal>(charts.size(), kUp), errors);
+    std::array<std::vector<float>, 4> errors;
+    errors.fill(std::vector<float>(charts.size(), 0.1f));
+    denoise(
+        flat, rnm, charts, std::vector<CoarseNormal>(charts.size(), kUp),
+        std::array<ErrorPlane, 4>{{{errors[0].data()}, {errors[1].data()}, {errors[2].data()}, {errors[3].data()}}});
     for (const float v : flat.pixels) EXPECT_FLOAT_EQ(v, 0.5f);
   }
 }

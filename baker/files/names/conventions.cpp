@@ -13,4 +13,19 @@ Conventions describeConventions(const Encoding& encoding) {
   return conventions;
 }
 
+std::vector<std::string> auxChannels(const Encoding& encoding) {
+  std::vector<std::string> channels = {"coverage", "validity", "stderr", "samples"};
+  for (std::size_t k = 0; k < encoding.mapCount(); ++k) channels.push_back("stderr" + std::to_string(k));
+  return channels;
+}
+
+std::string describeAuxChannels(const Encoding& encoding) {
+  std::string text = "channels";
+  for (const std::string& name : auxChannels(encoding)) text += (text == "channels" ? " " : ", ") + name;
+  return text +
+         ", by name (EXR files sort channels); stderr: standard error of the flat map's luminance as it is in its "
+         "file, "
+         "stderr<i>: of map i; NaN: not known";
+}
+
 }  // namespace lumel

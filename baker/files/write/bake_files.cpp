@@ -1,5 +1,7 @@
 #include "baker/files/write/bake_files.h"
 
+#include <algorithm>
+
 #include "baker/files/names/conventions.h"
 #include "baker/files/names/file_names.h"
 #include "baker/files/names/version.h"
@@ -30,9 +32,10 @@ std::map<std::string, std::string> pageMetadata(std::size_t page, const std::str
   metadata["lumel:dilate"] = std::to_string(record.dilate);
   if (kind == "aux") {
     metadata["lumel:units"] =
-        "coverage: area share 0..1; validity: share of gather rays that met no back face; stderr: standard error of "
-        "the flat map's luminance; samples: gather rays";
-    for (const char* key : {"decode", "decodeFormula", "basis", "order", "encoding", "maps"})
+        "coverage: area share 0..1; validity: share of gather rays that met no back face; stderr, stderr0 and so on: "
+        "standard error of the luminance of the flat map and of the maps in their order, as they are in these files, "
+        "NaN where it is not known; samples: gather rays";
+    for (const char* key : {"decode", "decodeFormula", "basis", "order", "encoding"})
       metadata.erase(std::string("lumel:") + key);
   }
   return metadata;
@@ -43,18 +46,30 @@ struct ImageFile {
   PendingFile file;
   const Image* image;
   WriteImageOptions options;
+  const Image* more = nullptr;  // whose channels come after those of `image`
 };
+
+/// The channels of both, pixel by pixel.
+Image joined(const Image& first, const Image& second) {
+  Image image(first.width, first.height, first.channels + second.channels);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      std::copy_n(first.at(x, y), first.channels, image.at(x, y));
+      std::copy_n(second.at(x, y), second.channels, image.at(x, y) + first.channels);
+    }
+  return image;
+}
 
 Expected<void> addPage(FileSet& set, const fs::path& dir, std::size_t page, const BakedPage& baked,
                        const BakeRecord& record, std::vector<ImageFile>& files) {
   WriteImageOptions options;
   options.format = record.half ? PixelFormat::Half : PixelFormat::Float;
   options.noisy = !record.half;
-  const auto add = [&](const std::string& kind, const Image& image) -> Expected<void> {
+  const auto add = [&](const std::string& kind, const Image& image, const Image* more = nullptr) -> Expected<void> {
     options.metadata = pageMetadata(page, kind, record);
     auto file = set.add(dir / pageFileName(page, kind));
     if (!file) return file.error();
-    files.push_back({std::move(*file), &image, options});
+    files.push_back({std::move(*file), &image, options, more});
     return {};
   };
   const std::vector<std::string>& mapNames = record.bakeOptions.encoding->mapNames();
@@ -64,15 +79,19 @@ Expected<void> addPage(FileSet& set, const fs::path& dir, std::size_t page, cons
   // Sample counts and coverage are exact in float only.
   options.format = PixelFormat::Float;
   options.noisy = false;
-  options.channelNames = {"coverage", "validity", "stderr", "samples"};
-  return add("aux", baked.aux);
+  options.channelNames = auxChannels(*record.bakeOptions.encoding);
+  return add("aux", baked.aux, &baked.mapErrors);
 }
 
 /// Compression takes most of the time, and a file at a time leaves cores idle.
 Expected<void> writeImages(const std::vector<ImageFile>& files) {
   std::vector<Expected<void>> done(files.size());
   parallelFor(files.size(), 1, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) done[i] = writeImage(files[i].file, *files[i].image, files[i].options);
+    for (std::size_t i = first; i < last; ++i) {
+      const ImageFile& file = files[i];
+      done[i] = file.more == nullptr ? writeImage(file.file, *file.image, file.options)
+                                     : writeImage(file.file, joined(*file.image, *file.more), file.options);
+    }
   });
   for (Expected<void>& d : done)
     if (!d) return std::move(d);
@@ -91,7 +110,7 @@ Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasRes
   if (!scene.environment.isBlack() && !scene.environment.image.empty()) {
     auto sky = set->add(dir / "sky.exr");
     if (!sky) return sky.error();
-    files.push_back({std::move(*sky), &scene.environment.image, {}});
+    files.push_back({std::move(*sky), &scene.environment.image, {}, nullptr});
   }
   if (auto done = writeImages(files); !done) return done;
   const auto writeFile = [&](const char* name, const auto& bytes) -> Expected<void> {

@@ -142,9 +142,17 @@ Json describeSeams(const SeamFigures& seams) {
 }
 
 Json describeError(const BakeStats& stats) {
-  const Json error = stats.meanStandardError ? Json(*stats.meanStandardError) : Json(nullptr);
+  Json flat = nullptr, all = nullptr, worst = nullptr;
+  if (!stats.errors.empty()) {
+    flat = stats.errors.front().mean;
+    all = Json::object();
+    for (const MapErrorFigure& figure : stats.errors) all[figure.map] = figure.mean;
+    worst = worstOf(stats.errors).map;
+  }
   return {{"meanFlat", stats.meanFlat},
-          {"meanStandardError", error},
+          {"meanStandardError", flat},
+          {"standardErrors", all},
+          {"worstMap", worst},
           {"projectionResidual", stats.projectionResidual},
           {"seams", describeSeams(stats.seams)},
           {"nonFiniteSamples", stats.nonFiniteSamples}};
@@ -216,7 +224,7 @@ std::string describeBake(const Scene& scene, const AtlasResult& atlas, const Bak
   json["settings"] = record.settings;
   json["encoding"] = describeEncoding(encoding);
   json["conventions"] = describeConventions(encoding);
-  json["conventions"]["aux"] = "channels coverage, validity, stderr, samples, by name (EXR files sort channels)";
+  json["conventions"]["aux"] = describeAuxChannels(encoding);
   json["sky"] = describeSky(scene.environment);
   json["atlas"] = {{"texelsPerMeter", atlas.atlas.texelsPerMeter},
                    {"charts", atlas.atlas.charts.size()},
