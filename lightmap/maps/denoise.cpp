@@ -37,7 +37,7 @@ constexpr float kLargestDistance = 6.0f;
 constexpr float kUnpaired = 0.5f;
 /// What averaging bends of light, squared, by how far the averaged texels differ beyond their noise. Calibrated
 /// (README): most of it is slopes, of which symmetric weights bend nothing.
-constexpr float kBiasShare = 0.03f;
+constexpr float kBiasShare = 0.05f;
 /// Noise below this share of a texel's light is rounding. It is not more than that light either: stated errors are
 /// shared with the texels around, and dark ones beside bright ones would take from these.
 constexpr float kLeastRelativeError = 1e-5f;

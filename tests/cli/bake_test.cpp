@@ -244,7 +244,13 @@ TEST(Bake, ErrorOfTooFewSamplesIsNotZero) {
                                  samples, "--sky-color", "1", "1", "1"});
     const bool known = samples == std::string("16");
     EXPECT_EQ(outcome.err.find("not known") == std::string::npos, known) << outcome.err;
-    EXPECT_EQ(readJson(dir / "out" / "bake.json")["error"]["meanStandardError"].is_number(), known);
+    const auto error = readJson(dir / "out" / "bake.json")["error"];
+    EXPECT_EQ(error["meanStandardError"].is_number(), known);
+    EXPECT_EQ(error["worstMap"].is_string(), known);
+    EXPECT_EQ(error["standardErrors"].size(), known ? 4u : 0u);
+    const auto aux = readImage(dir / "out" / "lightmap-0-aux.exr");
+    ASSERT_TRUE(aux);
+    for (const char* name : {"stderr", "stderr0", "stderr2"}) EXPECT_EQ(std::isfinite(channel(*aux, name, 8, 8)), known);
   }
 }
 

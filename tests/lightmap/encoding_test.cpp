@@ -13,8 +13,8 @@ namespace lumel {
 namespace {
 
 std::vector<std::shared_ptr<const Encoding>> allEncodings() {
-  return {rnmEncoding(Projection::Raw), rnmEncoding(Projection::Flat), rnmEncoding(Projection::Fit), flatEncoding(),
-          sh1Encoding()};
+  return {rnmEncoding(Projection::Raw), rnmEncoding(Projection::Flat), rnmEncoding(Projection::Fit),
+          rnmEncoding(Projection::Signed), flatEncoding(), sh1Encoding()};
 }
 
 /// What an encoding stores of light L(w) above the surface, by midpoints over the hemisphere.

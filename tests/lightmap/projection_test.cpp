@@ -226,6 +226,38 @@ TEST(FitKernels, AreRotationsOfOneAnother) {
     }
 }
 
+// A sun 10.66 degrees above the horizon, over against B0, on a bump that leans 19.34 degrees towards it: sin 30 is right.
+// The README and the help warn of what flat makes of it.
+TEST(Projection, GrazingLightOnABump) {
+  const double elevation = 10.66 * std::numbers::pi / 180, lean = 19.34 * std::numbers::pi / 180;
+  const Vec3 w(Vec3d(-std::cos(elevation), 0, std::sin(elevation)));
+  const Vec3 n(Vec3d(-std::sin(lean), 0, std::cos(lean)));
+  const auto decoded = [&](Projection projection, RnmDecode decode) {
+    const Vec3 k = RnmKernels(projection)(w);
+    const auto maps = finishTexel(projection, {Vec3(k.x), Vec3(k.y), Vec3(k.z)}, Vec3(w.z));
+    return decodeRnm(maps, n, decode).x;
+  };
+  EXPECT_NEAR(glm::dot(n, w), 0.5, 1e-5);
+  EXPECT_NEAR(decoded(Projection::Raw, RnmDecode::Squared), 0.494, 0.001);  // rounded figures
+  EXPECT_NEAR(decoded(Projection::Flat, RnmDecode::Squared), 0.27, 0.001);
+  EXPECT_NEAR(decoded(Projection::Signed, RnmDecode::Linear), 0.5, 1e-5);  // all three dots with n are positive
+}
+
+// The basis is orthonormal: plain dots give back w.n where n sees all of it, and the light on the flat normal exactly.
+TEST(Projection, SignedDotsAreTheDirection) {
+  const RnmKernels kernels(Projection::Signed);
+  for (int i = 0; i < 40; ++i) {
+    const Vec3 w(directionAt((i + 0.5) / 40, 0.7 * i));
+    const Vec3 k = kernels(w);
+    EXPECT_NEAR(k.x + k.y + k.z, std::sqrt(3.0f) * w.z, 1e-6f);
+    const std::array<Vec3, 3> maps = {Vec3(k.x), Vec3(k.y), Vec3(k.z)};
+    EXPECT_NEAR(decodeRnm(maps, Vec3(0, 0, 1), RnmDecode::Linear).x, w.z, 1e-6f);
+    EXPECT_NEAR(decodeRnm(maps, glm::normalize(Vec3(0.2f, -0.1f, 1)), RnmDecode::Linear).x,
+                glm::dot(w, glm::normalize(Vec3(0.2f, -0.1f, 1))), 1e-6f);
+  }
+  EXPECT_LT(kernels(Vec3(directionAt(0.1, 0))).y, 0.0f);
+}
+
 // The step after the sum, and degenerate input.
 
 TEST(FinishTexel, FlatScalesTheMeanPerColour) {
@@ -249,7 +281,7 @@ TEST(FinishTexel, TinyAndHugeValuesStayFinite) {
 
 TEST(RnmKernels, NothingFromBelow) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  for (const Projection p : {Projection::Raw, Projection::Flat, Projection::Fit})
+  for (const Projection p : {Projection::Raw, Projection::Flat, Projection::Fit, Projection::Signed})
     for (const Vec3 w : {Vec3(1, 0, 0), Vec3(0.6f, 0, -0.8f), Vec3(0, 0, -1), Vec3(0, 0, nan)})
       EXPECT_EQ(RnmKernels(p)(w), Vec3(0.0f));
 }
