@@ -52,10 +52,12 @@ struct Atlas {
   std::vector<Surface> surfaces;  // ordered by instance, primitive, page
   std::vector<Page> pages;
   std::vector<Chart> charts;
+  // One per instance of the scene: where its own lightmap UVs lie; page -1 with generated charts, or without lightmap.
+  std::vector<LightmapPlace> places;
   float texelsPerMeter = 0.0f;  // nominal density, as given or as found to fill the page; 0 with scene UVs alone
   double chartDensity = 0.0;    // that generated charts were made for, before they were scaled to it by chartScale
   double chartScale = 1.0;
-  int sceneUvPages = 0;  // the first pages hold the scene's own lightmap UVs
+  int sceneUvPages = 0;  // the first pages hold UVs that the scene gives as places on pages
 };
 
 }  // namespace lumel

@@ -17,6 +17,18 @@ namespace lumel {
 /// Largest coordinate that loaders let through, in metres: squares of larger distances overflow a float.
 inline constexpr float kMaxCoordinate = 1e18f;
 
+/// Where an object's lightmap lies in the atlas of a baked scene: page UV = TEXCOORD_1 * scale + offset.
+struct LightmapPlace {
+  int page = -1;  // -1: none for the object as a whole
+  Vec2 scale{1.0f};
+  Vec2 offset{0.0f};
+
+  Vec2 apply(Vec2 uv) const { return Vec2(Vec2d(uv) * Vec2d(scale) + Vec2d(offset)); }
+};
+
+/// Primitive::lightmapPage where the place of the instance says it.
+inline constexpr int kPageOfInstance = -2;
+
 /// A triangle list. Every array but `indices` has one entry per vertex or is empty.
 struct Primitive {
   std::string name;  // for messages: "mesh 'Wall' primitive 2"
@@ -28,7 +40,8 @@ struct Primitive {
   std::vector<Vec4> colors;               // COLOR_0, linear, alpha 1 where the file has RGB
   std::vector<std::uint32_t> indices;     // three per triangle, counter-clockwise from the front
   int material = 0;                       // into Scene::materials; always valid
-  int lightmapPage = -1;                  // extras.lumel.page of the primitive: its lightmap, on TEXCOORD_1; -1 = none
+  // extras.lumel.page of the primitive: the page of its lightmap, or -1 for none, whatever its instance says.
+  int lightmapPage = kPageOfInstance;
 
   std::size_t triangleCount() const { return indices.size() / 3; }
 };
@@ -51,6 +64,12 @@ struct Instance {
   int mesh = 0;
   Mat4 worldFromObject{1.0f};  // may mirror (negative determinant)
   ObjectSettings settings;
+  LightmapPlace lightmap;  // extras.lumel.page, scale and offset of the node of a baked scene
+
+  /// The page of a primitive's lightmap; -1: it has none.
+  int lightmapPageOf(const Primitive& primitive) const {
+    return primitive.lightmapPage == kPageOfInstance ? lightmap.page : primitive.lightmapPage;
+  }
 };
 
 enum class Wrap { Repeat, Mirror, Clamp };

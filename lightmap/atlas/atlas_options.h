@@ -11,8 +11,9 @@
 namespace lumel {
 
 enum class UvSource {
-  Auto,      // per mesh: a valid TEXCOORD_1 is used as it is, else charts are generated
-  Scene,     // TEXCOORD_1 must be valid: an invalid or missing one is an Input error with figures
+  Auto,      // per mesh: a valid TEXCOORD_1 is used, else charts are generated; Object where objects' UVs overlap
+  Scene,     // TEXCOORD_1 is a place on a page: an invalid or missing one is an Input error with figures
+  Object,    // TEXCOORD_1 is each object's own: a valid one gets a rectangle per instance, else charts are generated
   Generate,  // charts are always generated
   AsGiven,   // TEXCOORD_1 wherever there is one, valid or not: to be examined, not to be baked
 };
@@ -32,7 +33,8 @@ struct AtlasOptions {
 
 /// What a scene-supplied TEXCOORD_1 was found to be. Valid means: present, finite, in 0..1, and no texel covered twice.
 struct UvReport {
-  std::string mesh;  // name of the instance or mesh
+  std::string mesh;           // name of the first instance of the mesh
+  std::size_t instances = 0;  // that have it
   bool present = false;
   bool valid = false;
   std::size_t outOfRangeVertices = 0;
@@ -50,11 +52,13 @@ struct UvReport {
 
 /// Figures of the parameterization for logs, bake.json and `lumel info`.
 struct AtlasReport {
-  std::vector<UvReport> sceneUvs;
+  std::vector<UvReport> sceneUvs;  // one per mesh that has a TEXCOORD_1
   std::vector<std::string> warnings;
+  std::string uvChoice;               // one line: what the scene's UVs were taken for
+  std::size_t objectsWithOwnUvs = 0;  // that got a rectangle for their own UVs
   std::size_t generatedCharts = 0;
-  std::size_t keptCharts = 0;  // of these: where they were in AtlasOptions::layout
-  double keptShare = 0.0;      // of the surface with generated charts
+  std::size_t keptCharts = 0;  // of rectangles and generated charts: where they were in AtlasOptions::layout
+  double keptShare = 0.0;      // of their surface
   std::size_t nonManifoldEdges = 0;
   std::size_t degenerateTriangles = 0;  // without area: they are in no chart and get no texels
   double chartSeconds = 0.0;

@@ -81,11 +81,14 @@ class Placer {
       const UnwrappedChart* chart;
       double scale;
       std::uint32_t group;
+      bool mayRotate;
     };
     std::vector<Source> sources;
-    for (std::size_t u = 0; u < objects_.uses.size(); ++u)
-      for (const UnwrappedChart& chart : objects_.layouts[objects_.uses[u].layout].unwrapped.charts)
-        sources.push_back({&chart, objects_.uses[u].scale * scale, static_cast<std::uint32_t>(u)});
+    for (std::size_t u = 0; u < objects_.uses.size(); ++u) {
+      const ObjectLayout& layout = objects_.layouts[objects_.uses[u].layout];
+      for (const UnwrappedChart& chart : layout.unwrapped.charts)
+        sources.push_back({&chart, objects_.uses[u].scale * scale, static_cast<std::uint32_t>(u), !layout.own});
+    }
     places.resize(sources.size());
     std::vector<PackShape> shapes(sources.size());
     const GridSettings grid = gridSettings(options_.pageSize, options_.padding, options_.blockAlign);
@@ -95,6 +98,7 @@ class Placer {
         const PackShape plain = shapeOf(*source.chart, start(*source.chart, Vec2d(source.scale)), source.group);
         places[i] = start(*source.chart, source.scale * snapFactors(plain, grid));
         shapes[i] = shapeOf(*source.chart, places[i], source.group);
+        shapes[i].mayRotate = source.mayRotate;
       }
     });
     return shapes;

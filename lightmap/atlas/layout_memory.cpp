@@ -47,7 +47,9 @@ std::vector<std::uint64_t> chartKeys(const Scene& scene, const ObjectLayouts& ob
           const SourceTriangle source = layout.source[t];
           sum += hashOf(primitives[static_cast<std::size_t>(source.primitive)], source.triangle);
         }
-        keys[u].push_back(mixed(mixed(name, chart.triangles.size()), sum));
+        // A rectangle must not take the place of a chart of the same triangles, which may be turned.
+        const std::uint64_t kind = layout.own ? ~std::uint64_t{0} : 0;
+        keys[u].push_back(mixed(mixed(name, chart.triangles.size()), sum ^ kind));
       }
     }
   });

@@ -64,15 +64,22 @@ void forEachReceiving(const Scene& scene, const Instance& instance, Body body) {
   }
 }
 
+TriangleSources receivingTriangles(const Scene& scene, const Instance& instance) {
+  TriangleSources source;
+  const std::vector<Primitive>& primitives = scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives;
+  for (std::size_t p = 0; p < primitives.size(); ++p)
+    if (receivesLight(scene, instance, primitives[p])) source.add(static_cast<int>(p), primitives[p].triangleCount());
+  return source;
+}
+
 /// The instance's triangles that get a lightmap, in texels, counter-clockwise from the front in the world.
-TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texelsPerMeter, TriangleSources& source) {
+TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texelsPerMeter) {
   TriangleSoup soup;
   soup.points.toTexels = Mat3d(Mat3(instance.worldFromObject)) * densityOf(instance, texelsPerMeter);
   const bool mirrors = glm::determinant(soup.points.toTexels) < 0;
   const Mat3 objectFromWorld = glm::inverse(Mat3(instance.worldFromObject));
   const std::vector<Primitive>& primitives = scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives;
-  for (std::size_t p = 0; p < primitives.size(); ++p) {
-    const Primitive& primitive = primitives[p];
+  for (const Primitive& primitive : primitives) {
     if (!receivesLight(scene, instance, primitive)) continue;
     std::vector<Vec3>& positions = soup.points.positions;
     const auto base = static_cast<std::uint32_t>(positions.size());
@@ -83,7 +90,6 @@ TriangleSoup makeSoup(const Scene& scene, const Instance& instance, double texel
       for (std::size_t i = 0; i < primitive.positions.size(); ++i)
         soup.frames[base + i] = Vec4(frameFromTangent(primitive.normals[i], primitive.tangents[i]).t,
                                      primitive.tangents[i].w < 0 ? -1.0f : 1.0f);
-    source.add(static_cast<int>(p), primitive.triangleCount());
     for (std::uint32_t t = 0; t < primitive.triangleCount(); ++t)
       for (const std::uint32_t k : {0u, mirrors ? 2u : 1u, mirrors ? 1u : 2u})
         soup.indices.push_back(base + primitive.indices[3 * t + k]);
@@ -109,8 +115,8 @@ double weightedLength(const Scene& scene, const Instance& instance) {
   return std::sqrt(squared) * static_cast<double>(instance.settings.texelDensityScale);
 }
 
-ObjectLayouts layOutObjects(const Scene& scene, const std::vector<int>& instances, double texelsPerMeter,
-                            const UnwrapOptions& options, Progress& progress) {
+ObjectLayouts layOutObjects(const Scene& scene, const std::vector<int>& instances, const std::vector<bool>& ownUvs,
+                            double texelsPerMeter, const UnwrapOptions& options, Progress& progress) {
   ObjectLayouts result;
   std::vector<Shape> shapes;
   for (const int i : instances) shapes.push_back(shapeOf(scene.instances[static_cast<std::size_t>(i)], texelsPerMeter));
@@ -137,7 +143,13 @@ ObjectLayouts layOutObjects(const Scene& scene, const std::vector<int>& instance
     for (std::size_t i = first; i < last && !progress.cancelled(); ++i) {
       ObjectLayout& layout = result.layouts[i];
       const Instance& instance = scene.instances[static_cast<std::size_t>(instances[leaders[i]])];
-      layout.unwrapped = unwrap(makeSoup(scene, instance, texelsPerMeter, layout.source), options);
+      layout.source = receivingTriangles(scene, instance);
+      if (ownUvs[static_cast<std::size_t>(instance.mesh)]) {
+        layout.own = measureOwnUvs(scene, instance, texelsPerMeter);
+        layout.unwrapped = boxChart(*layout.own, layout.source.size());
+      } else {
+        layout.unwrapped = unwrap(makeSoup(scene, instance, texelsPerMeter), options);
+      }
       progress.advance(layout.source.size());
     }
   });

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "lightmap/atlas/own_uvs.h"
 #include "lightmap/charts/unwrap.h"
 #include "scene/base/progress.h"
 #include "scene/scene.h"
@@ -38,7 +40,8 @@ class TriangleSources {
 
 struct ObjectLayout {
   Unwrapped unwrapped;
-  TriangleSources source;  // of the soup that was unwrapped
+  TriangleSources source;     // of the soup that was unwrapped
+  std::optional<OwnUvs> own;  // UVs that came with the object: then the one chart is their rectangle
 };
 
 struct LayoutUse {
@@ -58,8 +61,9 @@ double weightedArea(const Scene& scene, const Instance& instance);
 /// Length of its longest edge that gets a lightmap in metres, times its density scale.
 double weightedLength(const Scene& scene, const Instance& instance);
 
-/// Parallel over layouts. A cancelled run returns early with what it has: ask progress.cancelled().
-ObjectLayouts layOutObjects(const Scene& scene, const std::vector<int>& instances, double texelsPerMeter,
-                            const UnwrapOptions& options, Progress& progress);
+/// Charts for `instances`, but for meshes with `ownUvs` (one flag per mesh of the scene) a rectangle for the UVs that
+/// they bring. Parallel over layouts. A cancelled run returns early with what it has: ask progress.cancelled().
+ObjectLayouts layOutObjects(const Scene& scene, const std::vector<int>& instances, const std::vector<bool>& ownUvs,
+                            double texelsPerMeter, const UnwrapOptions& options, Progress& progress);
 
 }  // namespace lumel

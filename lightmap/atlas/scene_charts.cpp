@@ -53,8 +53,8 @@ bool sameFrame(const Vec4& a, const Vec4& b) {
 
 }  // namespace
 
-std::vector<PlacedTriangle> placeSceneUvs(const Scene& scene, int instanceIndex, int page, int pageSize, Atlas& atlas,
-                                          UvReport& report) {
+std::vector<PlacedTriangle> placeSceneUvs(const Scene& scene, int instanceIndex, const LightmapPlace& place,
+                                          const Vec2d& pageSize, Atlas& atlas, UvReport& report) {
   const Instance& instance = scene.instances[static_cast<std::size_t>(instanceIndex)];
   const Mesh& mesh = scene.meshes[static_cast<std::size_t>(instance.mesh)];
   Vertices all = gather(mesh);
@@ -79,7 +79,11 @@ std::vector<PlacedTriangle> placeSceneUvs(const Scene& scene, int instanceIndex,
       const std::uint32_t* v = &primitive.indices[3 * t];
       const std::vector<Vec2>& uvs = primitive.uvSets[1];
       for (std::size_t k = 1; k < 3; ++k) unite(parent, all.base[p] + v[0], all.base[p] + v[k]);
-      placed.push_back({static_cast<int>(p), t, page, 0, {uvs[v[0]], uvs[v[1]], uvs[v[2]]}});
+      placed.push_back({static_cast<int>(p),
+                        t,
+                        place.page,
+                        0,
+                        {place.apply(uvs[v[0]]), place.apply(uvs[v[1]]), place.apply(uvs[v[2]])}});
       roots.push_back(all.base[p] + v[0]);
     }
   }
@@ -104,7 +108,7 @@ std::vector<PlacedTriangle> placeSceneUvs(const Scene& scene, int instanceIndex,
       chart.crossesFrame = chart.crossesFrame || breaks[all.base[static_cast<std::size_t>(triangle.primitive)] + v];
     }
     chart.surface += triangleArea(p[0], p[1], p[2]);
-    chart.texels += triangleArea(Vec2d(triangle.uvs[0]), triangle.uvs[1], triangle.uvs[2]) * pageSize * pageSize;
+    chart.texels += triangleArea(Vec2d(triangle.uvs[0]), triangle.uvs[1], triangle.uvs[2]) * pageSize.x * pageSize.y;
   }
   for (const ChartFigures& chart : figures) {
     atlas.charts.push_back(
