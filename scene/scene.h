@@ -26,9 +26,6 @@ struct LightmapPlace {
   Vec2 apply(Vec2 uv) const { return Vec2(Vec2d(uv) * Vec2d(scale) + Vec2d(offset)); }
 };
 
-/// Primitive::lightmapPage where the place of the instance says it.
-inline constexpr int kPageOfInstance = -2;
-
 /// A triangle list. Every array but `indices` has one entry per vertex or is empty.
 struct Primitive {
   std::string name;  // for messages: "mesh 'Wall' primitive 2"
@@ -40,8 +37,8 @@ struct Primitive {
   std::vector<Vec4> colors;               // COLOR_0, linear, alpha 1 where the file has RGB
   std::vector<std::uint32_t> indices;     // three per triangle, counter-clockwise from the front
   int material = 0;                       // into Scene::materials; always valid
-  // extras.lumel.page of the primitive: the page of its lightmap, or -1 for none, whatever its instance says.
-  int lightmapPage = kPageOfInstance;
+  int lightmapPage = -1;                  // extras.lumel.page of the primitive: its lightmap, on TEXCOORD_1; -1 = as
+                                          // its instance says
 
   std::size_t triangleCount() const { return indices.size() / 3; }
 };
@@ -68,7 +65,7 @@ struct Instance {
 
   /// The page of a primitive's lightmap; -1: it has none.
   int lightmapPageOf(const Primitive& primitive) const {
-    return primitive.lightmapPage == kPageOfInstance ? lightmap.page : primitive.lightmapPage;
+    return primitive.lightmapPage < 0 ? lightmap.page : primitive.lightmapPage;
   }
 };
 

@@ -15,6 +15,7 @@
 #include "baker/files/write/bake_files.h"
 #include "baker/light/lit_scene.h"
 #include "lightmap/atlas/atlas.h"
+#include "lightmap/atlas/split_triangles.h"
 #include "lightmap/texels/texels.h"
 #include "scene/base/parallel.h"
 #include "scene/base/process_memory.h"
@@ -38,12 +39,14 @@ struct BakeArguments : SceneArguments {
   fs::path output;
   AtlasOptions atlas;
   fs::path layoutFrom;
+  std::string objects;  // names, comma between them; empty: all
   BakeOptions bake;
   Denoise denoise = Denoise::Auto;
   Audit audit = Audit::Auto;
   float auditFailAbove = 0.0f;  // 0: never
   int dilate = kDilateByPadding;
   bool half = false;
+  bool flatten = false;
   bool strict = false;
   int threads = 0;
   Quality quality = Quality::Production;
@@ -100,6 +103,8 @@ void declareOptions(OptionTable& options, BakeArguments& a) {
   output.placeholder = "DIR";
   output.required = true;
   options.flag("half", a.half, "Write half floats: half the size, values up to 65504");
+  options.flag("flatten", a.flatten,
+               "Write scene.glb in world space: a mesh of its own for each object, UVs of pages, no transforms");
   options.choice("denoise", a.denoise, {"auto", "on", "off"},
                  "Average texels with those around them that agree within their noise; auto: with --integrator gather");
   options.choice(
@@ -114,10 +119,40 @@ void declareOptions(OptionTable& options, BakeArguments& a) {
       .path("layout-from", a.layoutFrom,
             "Folder of an earlier bake, may be the output's: unchanged charts stay where they are in it [none]")
       .placeholder = "DIR";
+  options
+      .text("objects", a.objects,
+            "Bake these objects alone, names with commas between, NAME* for all that begin so; the others block and "
+            "bounce light [all]")
+      .placeholder = "NAME,...";
   declareLightOptions(options, a);
   options.group("General");
   options.flag("strict", a.strict, "Exit with 4 if there was any warning; the result is written all the same");
   options.integer("threads", a.threads, {0, 1024}, "Threads to use, without influence on the result; 0: one per core");
+}
+
+/// Leaves a lightmap to the objects on the list alone.
+Expected<void> keepObjects(const std::string& list, Scene& scene) {
+  if (list.empty()) return {};
+  const auto matches = [](const std::string& pattern, const std::string& name) {
+    return !pattern.empty() && pattern.back() == '*'
+               ? name.compare(0, pattern.size() - 1, pattern, 0, pattern.size() - 1) == 0
+               : name == pattern;
+  };
+  std::vector<bool> wanted(scene.instances.size(), false);
+  for (std::size_t first = 0; first <= list.size();) {
+    const std::size_t comma = std::min(list.find(',', first), list.size());
+    const std::string pattern = list.substr(first, comma - first);
+    first = comma + 1;
+    bool found = false;
+    for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+      if (!matches(pattern, scene.instances[i].name)) continue;
+      wanted[i] = found = true;
+    }
+    if (!found) return usageError("--objects: no object is named '" + pattern + "'; they are the names of nodes");
+  }
+  for (std::size_t i = 0; i < scene.instances.size(); ++i)
+    scene.instances[i].settings.receives = scene.instances[i].settings.receives && wanted[i];
+  return {};
 }
 
 /// Warns of light that halfs cannot hold, where that is known before the bake: suns and skies as a facing surface
@@ -250,6 +285,7 @@ BakeRecord recordOf(const BakeArguments& a, int dilate, nlohmann::ordered_json s
   record.bakeOptions.encoding = rnmEncoding(a.projection);
   record.dilate = dilate;
   record.half = a.half;
+  record.sceneForm = a.flatten ? SceneForm::Flattened : SceneForm::Instances;
   record.threads = availableThreads();
   record.settings = std::move(settings);
   return record;
@@ -265,9 +301,10 @@ Expected<AtlasResult> makeAtlas(const Scene& scene, const BakeArguments& a, Comm
   auto atlas = buildAtlas(scene, options, context.progress);
   if (!atlas || context.quiet) return atlas;
   printWarnings(atlas->report.warnings);
+  if (!atlas->report.sceneUvs.empty()) std::fprintf(stderr, "%s\n", atlas->report.uvChoice.c_str());
   if (options.layout)
     std::fprintf(stderr, "%zu of %zu charts (%.1f%% of their surface) stay where they were\n", atlas->report.keptCharts,
-                 atlas->report.generatedCharts, 100.0 * atlas->report.keptShare);
+                 atlas->report.generatedCharts + atlas->report.objectsWithOwnUvs, 100.0 * atlas->report.keptShare);
   return atlas;
 }
 
@@ -292,12 +329,17 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   clock.start("load");
   auto scene = loadLitScene(a, context.progress);
   if (!scene) return scene.error();
+  if (auto kept = keepObjects(a.objects, *scene); !kept) return kept.error();
   if (a.half) warnOfHalf(*scene);
   if (!context.quiet) printSettings(record.settings);
   if (!context.quiet) printWarnings(scene->report.warnings);
   if (progress.cancelled()) return interrupted();
 
   clock.start("atlas");
+  const SplitReport split = splitLongTriangles(*scene, a.atlas);
+  if (split.triangles > 0 && !context.quiet)
+    std::fprintf(stderr, "%zu triangles are too long for a page at this density: they are split into %zu\n",
+                 split.triangles, split.pieces);
   const auto atlas = makeAtlas(*scene, a, context);
   if (!atlas) return atlas.error();
   if (atlas->atlas.charts.empty()) {

@@ -9,6 +9,7 @@
 #include "baker/commands/scene_figures.h"
 #include "baker/commands/scene_lint.h"
 #include "baker/files/read/baked_scene.h"
+#include "lightmap/atlas/split_triangles.h"
 #include "scene/images/image_io.h"
 #include "scene/load/load_scene.h"
 
@@ -23,7 +24,6 @@ constexpr const char* kSceneOptions = "Scene";
 
 struct InfoArguments : SceneArguments {  // `scene`: a scene, an image or a bake
   bool json = false;
-  EstimateOptions estimate;
   bool lint = false;
   SceneLintOptions lintOptions;
 };
@@ -90,7 +90,8 @@ Expected<Json> describeImage(const fs::path& file) {
 Expected<Json> describeBakeFolder(const fs::path& dir) {
   auto json = readBakeJson(dir);
   if (!json) return json.error();
-  // The list of charts is for programs; info gives their number.
+  // The lists of objects and charts are for programs; info gives the number of charts.
+  json->erase("objects");
   json->erase("charts");
   Json out = {{"kind", "bake"}, {"folder", dir.string()}};
   out.update(*json);
@@ -109,20 +110,22 @@ Expected<Json> describe(const InfoArguments& a) {
   std::error_code ec;
   if (fs::is_directory(a.scene, ec)) return describeBakeFolder(a.scene);
   if (!isSceneFile(a.scene)) return describeImage(a.scene);
-  const auto scene = loadSceneUnderSky(a);
+  auto scene = loadSceneUnderSky(a);
   if (!scene) return scene.error();
+  const AtlasOptions& atlas = a.lintOptions.atlas;
   Json out = {{"kind", "scene"}, {"file", a.scene.string()}};
   if (a.lint || !a.lintOptions.pictures.empty()) {
-    SceneLintOptions options = a.lintOptions;
-    options.atlas.texelsPerMeter = a.estimate.texelsPerMeter;
-    options.atlas.pageSize = a.estimate.pageSize;
-    const auto lint = lintScene(*scene, options);
+    splitLongTriangles(*scene, atlas);
+    const auto lint = lintScene(*scene, a.lintOptions);
     if (!lint) return lint.error();
     // Text shows the lines alone: they hold all the findings.
     out["lint"] = a.json ? *lint : lint->at("lines");
     return out;
   }
-  out.update(describeScene(*scene, a.estimate));
+  out.update(describeScene(*scene, atlas));
+  if (const SplitReport split = splitLongTriangles(*scene, atlas); split.triangles > 0)
+    out["trianglesLongerThanAPage"] =
+        std::to_string(split.triangles) + ", they are split into " + std::to_string(split.pieces);
   return out;
 }
 
@@ -147,13 +150,14 @@ Command infoCommand() {
       "FILE|DIR";
   command.options.flag("json", a.json, "Print JSON");
   command.options.group(kSceneOptions);
-  command.options.number("texels-per-meter", a.estimate.texelsPerMeter, {0.0f, 1e6f},
+  command.options.number("texels-per-meter", a.lintOptions.atlas.texelsPerMeter, {0.0f, 1e6f},
                          "Density for the estimate; 0: the density that fills one page");
-  command.options.integer("page-size", a.estimate.pageSize, {4, 16384}, "Texels on a side of a page, for the estimate");
+  command.options.integer("page-size", a.lintOptions.atlas.pageSize, {4, 16384},
+                          "Texels on a side of a page, for the estimate");
   command.options.flag("lint", a.lint,
                        "Check the lightmap UVs that a bake would use: overlaps, flips, tiny charts, ...");
-  command.options.choice("uv", a.lintOptions.atlas.uvSource, {"auto", "scene", "generate"},
-                         "Lightmap UVs to check: the scene's where valid, the scene's, or generated ones");
+  command.options.choice("uv", a.lintOptions.atlas.uvSource, {"auto", "scene", "object", "generate"},
+                         "Lightmap UVs to look at, as in lumel bake");
   command.options.integer("padding", a.lintOptions.atlas.padding, {0, 64}, "Texels between charts");
   command.options.path("charts", a.lintOptions.pictures, "Write a picture of each page's charts (PNG) to this folder")
       .placeholder = "DIR";

@@ -20,9 +20,11 @@ void declareOutsidePaths(OptionTable& options, SceneArguments& a) {
 
 void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas) {
   options.group("Atlas");
-  options.choice("uv", atlas.uvSource, {"auto", "scene", "generate"},
-                 "Lightmap UVs: TEXCOORD_1 where it is valid, else generated (auto); TEXCOORD_1 or an error (scene); "
-                 "always generated (generate)");
+  options.choice(
+      "uv", atlas.uvSource, {"auto", "scene", "object", "generate"},
+      "Lightmap UVs: TEXCOORD_1 where it is valid, else generated (auto); TEXCOORD_1 as the place on a page, "
+      "or an error (scene); TEXCOORD_1 as each object's own, with a rectangle for each at the density "
+      "(object; auto does so where UVs of objects overlap); always generated (generate)");
   options.number("texels-per-meter", atlas.texelsPerMeter, {0.0f, 1e6f},
                  "Texel density; 0: the density that fills one page");
   options.integer("page-size", atlas.pageSize, {4, 16384}, "Texels on a side of a page, a multiple of 4");

@@ -5,6 +5,7 @@
 
 #include "baker/bake/memory_estimate.h"
 #include "lightmap/atlas/object_layouts.h"
+#include "lightmap/atlas/scene_uvs.h"
 
 namespace lumel {
 namespace {
@@ -93,19 +94,54 @@ Json countUvSets(const Scene& scene) {
   return json;
 }
 
-Json estimate(const Totals& totals, const BakeSize& scene, const EstimateOptions& options) {
+/// What the lightmap UVs of the scene give before anything is packed.
+struct UvFigures {
+  double packedArea = 0.0;  // square metres, weighted by density, that need charts or rectangles
+  double placedArea = 0.0;  // of surface whose UVs are places on pages
+  double placedTexels = 0.0;
+  int placedPages = 0;
+  Json json;
+};
+
+UvFigures describeUvs(const Scene& scene, const AtlasOptions& options) {
+  const SceneUvs uvs = examineSceneUvs(scene, receiversOf(scene), options);
+  UvFigures figures;
+  figures.placedPages = uvs.pageCount;
+  for (const SceneUvUse& use : uvs.uses) {
+    const double area = weightedArea(scene, scene.instances[toSize(use.instance)]);
+    const bool placed = use.used && !uvs.perObject;
+    (placed ? figures.placedArea : figures.packedArea) += area;
+    if (placed) figures.placedTexels += uvs.reports[toSize(use.report)].coveredTexels;
+  }
+  figures.json["use"] = describeUvChoice(uvs, options.uvSource);
+  Json invalid = Json::array();
+  for (const UvReport& report : uvs.reports)
+    if (!report.valid)
+      invalid.push_back(report.mesh + " (" + std::to_string(report.instances) +
+                        (report.instances == 1 ? " object)" : " objects)"));
+  if (!invalid.empty()) figures.json["notValid"] = std::move(invalid);
+  return figures;
+}
+
+Json estimate(const UvFigures& uvs, const BakeSize& scene, const AtlasOptions& options) {
   // So much of a page is surface; generated charts stretch little, so area times density squared gives texels. Partly
   // covered ones at the borders of charts come on top.
   constexpr double kPacking = 0.82;
   constexpr double kTouched = 1.07;
   const double bytesPerPageTexel = (3 * (scene.maps + 1) + 4) * sizeof(float);  // what the images hold
   const double page = static_cast<double>(options.pageSize) * static_cast<double>(options.pageSize);
-  const double area = totals.receivingArea;
-  if (!(area > 0.0)) return nullptr;
-  const double density =
-      options.texelsPerMeter > 0.0f ? static_cast<double>(options.texelsPerMeter) : std::sqrt(kPacking * page / area);
-  const double texels = area * density * density;
-  const double pages = std::max(1.0, std::ceil(texels / (kPacking * page) - 1e-6));
+  if (!(uvs.packedArea + uvs.placedArea > 0.0)) return nullptr;
+  const double placedDensity = uvs.placedArea > 0.0 ? std::sqrt(uvs.placedTexels / uvs.placedArea) : 0.0;
+  double density = placedDensity, texels = 0.0, pages = 0.0;
+  if (uvs.packedArea > 0.0) {
+    density = options.texelsPerMeter > 0.0f ? static_cast<double>(options.texelsPerMeter)
+                                            : std::sqrt(kPacking * page / uvs.packedArea);
+    if (!(options.texelsPerMeter > 0.0f) && placedDensity > 0.0) density = std::min(density, placedDensity);
+    texels = uvs.packedArea * density * density;
+    pages = std::max(1.0, std::ceil(texels / (kPacking * page) - 1e-6));
+  }
+  texels += uvs.placedTexels;
+  pages += uvs.placedPages;
   BakeSize size = scene;
   size.pageTexels = pages * page;
   size.coveredTexels = kTouched * texels;
@@ -118,7 +154,7 @@ Json estimate(const Totals& totals, const BakeSize& scene, const EstimateOptions
 
 }  // namespace
 
-Json describeScene(const Scene& scene, const EstimateOptions& options) {
+Json describeScene(const Scene& scene, const AtlasOptions& options) {
   const Totals totals = addUp(scene);
   std::size_t primitives = 0;
   std::size_t triangles = 0;
@@ -150,7 +186,9 @@ Json describeScene(const Scene& scene, const EstimateOptions& options) {
   json["lights"] = describeLights(scene);
   if (!scene.environment.isBlack()) json["sky"] = describeSky(scene.environment);
   json["cameras"] = std::move(cameras);
-  json["estimate"] = estimate(totals, sceneSize(scene), options);
+  UvFigures uvs = describeUvs(scene, options);
+  json["lightmapUvs"] = std::move(uvs.json);
+  json["estimate"] = estimate(uvs, sceneSize(scene), options);
   json["warnings"] = scene.report.warnings;
   return json;
 }

@@ -3,17 +3,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "lightmap/atlas/atlas_options.h"
 #include "scene/scene.h"
 
 namespace lumel {
 
-struct EstimateOptions {
-  float texelsPerMeter = 0.0f;  // 0: the density that fills one page
-  int pageSize = 1024;
-};
-
-/// Counts, bounds, lists of materials, images, lights and cameras, the sky, the loader's warnings, and an estimate of
-/// texels, pages, memory and disk space.
-nlohmann::ordered_json describeScene(const Scene& scene, const EstimateOptions& options);
+/// Counts, bounds, lists of materials, images, lights and cameras, the sky, the loader's warnings, what a bake with
+/// these options takes the lightmap UVs for, and an estimate of its texels, pages, memory and disk space.
+nlohmann::ordered_json describeScene(const Scene& scene, const AtlasOptions& options);
 
 }  // namespace lumel

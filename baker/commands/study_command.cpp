@@ -6,6 +6,7 @@
 #include "baker/commands/command.h"
 #include "baker/commands/scene_arguments.h"
 #include "baker/study/study_files.h"
+#include "lightmap/atlas/split_triangles.h"
 #include "scene/base/parallel.h"
 #include "scene/files/file_set.h"
 
@@ -54,8 +55,9 @@ Expected<void> runStudy(const StudyArguments& a, CommandContext& context) {
   if (auto checked = checkSky(a); !checked) return checked;
   if (auto writable = checkWritable(a.output); !writable) return writable;
   const ThreadLimit limit(a.threads);
-  const auto scene = loadLitScene(a, context.progress);
+  auto scene = loadLitScene(a, context.progress);
   if (!scene) return scene.error();
+  splitLongTriangles(*scene, a.study.atlas);
   if (!hasLight(*scene)) return inputError(a.scene.string() + ": nothing in it shines; give --sky-color or --sky");
   if (!context.quiet) printWarnings(scene->report.warnings);
   if (!context.quiet) std::fprintf(stderr, "study of %s: a reference, then the candidates\n", a.scene.c_str());

@@ -20,6 +20,7 @@ struct Shape {
   const Material* material = nullptr;
   int number = 0;
   bool mirrored = false;
+  LightmapPlace lightmap;
   std::vector<Vec3> positions;
   Mat3 normalMatrix{1.0f};
   Mat3 linear{1.0f};
@@ -187,6 +188,8 @@ void Compositor::Impl::collectShapes() {
       shape.primitive = &primitive;
       shape.material = &baked.scene.materials[toSize(primitive.material)];
       shape.number = number++;
+      shape.lightmap = instance.lightmap;
+      shape.lightmap.page = instance.lightmapPageOf(primitive);
       if (primitive.indices.empty()) continue;
       shape.linear = Mat3(instance.worldFromObject);
       shape.mirrored = glm::determinant(shape.linear) < 0.0f;
@@ -327,10 +330,10 @@ Vec3 Compositor::Impl::worldNormal(const Hit& hit) const {
 }
 
 Vec3 Compositor::Impl::light(const Hit& hit) const {
-  const int page = hit.shape->primitive->lightmapPage;
-  if (page < 0) return baked.meanFlat;
-  const std::vector<Image>& maps = baked.pages[toSize(page)];
-  const Bilinear lookup(maps[0], uvAt(hit, 1));
+  const LightmapPlace& place = hit.shape->lightmap;
+  if (place.page < 0) return baked.meanFlat;
+  const std::vector<Image>& maps = baked.pages[toSize(place.page)];
+  const Bilinear lookup(maps[0], place.apply(uvAt(hit, 1)));
   std::array<Vec3, kMostMaps> values;
   std::transform(maps.begin(), maps.end(), values.begin(), lookup);
   return baked.encoding->decode(std::span(values).first(maps.size()), tangentNormal(hit));

@@ -63,8 +63,8 @@ class NodeFlattener {
   std::optional<Error> visit(std::size_t node);
   std::optional<Error> addMesh(std::size_t node);
   Expected<std::vector<glm::dmat4>> instanceTransforms(std::size_t node) const;
-  void addInstance(int mesh, const std::string& name, const glm::dmat4& world, const ObjectSettings& settings,
-                   const std::vector<double>& weights);
+  void addInstance(const tinygltf::Node& node, const std::string& name, const glm::dmat4& world,
+                   const ObjectSettings& settings);
   int addUse(MeshUse use);
   int plainUse(int mesh);
   void addLight(std::size_t node, int light);
@@ -172,9 +172,12 @@ int NodeFlattener::plainUse(int mesh) {
   return it->second;
 }
 
-void NodeFlattener::addInstance(int mesh, const std::string& name, const glm::dmat4& world,
-                                const ObjectSettings& settings, const std::vector<double>& weights) {
+void NodeFlattener::addInstance(const tinygltf::Node& node, const std::string& name, const glm::dmat4& world,
+                                const ObjectSettings& settings) {
+  const int mesh = node.mesh;
+  const std::vector<double>& weights = node.weights;
   Instance instance;
+  instance.lightmap = readLightmapPlace(node.extras);
   instance.name = name;
   instance.settings = settings;
   if (isInvertible(world)) {
@@ -214,8 +217,7 @@ std::optional<Error> NodeFlattener::addMesh(std::size_t index) {
     return document_.error(placeOf(index), "the scene has more than " + std::to_string(kMaxInstances) + " instances");
   const bool many = findExtension(node.extensions, "EXT_mesh_gpu_instancing") != nullptr;
   for (std::size_t i = 0; i < transforms->size(); ++i)
-    addInstance(node.mesh, many ? name + "[" + std::to_string(i) + "]" : name, (*transforms)[i], settings,
-                node.weights);
+    addInstance(node, many ? name + "[" + std::to_string(i) + "]" : name, (*transforms)[i], settings);
   return std::nullopt;
 }
 

@@ -54,8 +54,8 @@ struct Fixture {
     atlas.surfaces = {s};
   }
 
-  std::string encoded() const {
-    const auto pieces = encodeGlb(scene, atlas);
+  std::string encoded(SceneForm form) const {
+    const auto pieces = encodeGlb(scene, atlas, form);
     EXPECT_TRUE(pieces);
     std::string glb;
     if (pieces)
@@ -63,8 +63,8 @@ struct Fixture {
     return glb;
   }
 
-  Scene roundTrip() const {
-    const std::string glb = encoded();
+  Scene roundTrip(SceneForm form = SceneForm::Instances) const {
+    const std::string glb = encoded(form);
     const fs::path dir = scratch();
     std::ofstream(dir / "scene.glb", std::ios::binary).write(glb.data(), static_cast<std::streamsize>(glb.size()));
     auto loaded = loadScene(dir / "scene.glb");
@@ -79,7 +79,9 @@ TEST(GlbWriter, SurfacesKeepFramePageAndSourceAttributes) {
   ASSERT_EQ(scene.instances.size(), 2u);
   EXPECT_EQ(scene.instances[0].name, "Left");
   const Primitive& p = scene.primitive(scene.instances[0].mesh, 0);
-  EXPECT_EQ(p.lightmapPage, 3);
+  EXPECT_EQ(scene.instances[0].lightmapPageOf(p), 3);
+  EXPECT_EQ(scene.instances[0].lightmap.scale, Vec2(1));
+  EXPECT_EQ(scene.instances[0].lightmap.offset, Vec2(0));
   EXPECT_EQ(p.positions, fixture.atlas.surfaces[0].positions);
   EXPECT_EQ(p.tangents, fixture.atlas.surfaces[0].tangents);
   ASSERT_GE(p.uvSets.size(), 2u);
@@ -88,13 +90,88 @@ TEST(GlbWriter, SurfacesKeepFramePageAndSourceAttributes) {
   EXPECT_EQ(p.colors[1], Vec4(0, 1, 0, 1));
 }
 
+/// As the atlas has it for an instance under a transform: in the world, of either handedness.
+Surface movedBy(const Surface& surface, const Mat4& worldFromObject) {
+  Surface s = surface;
+  const Mat3 linear(worldFromObject);
+  const bool mirrors = glm::determinant(linear) < 0;
+  for (Vec3& p : s.positions) p = Vec3(worldFromObject * Vec4(p, 1));
+  for (Vec3& n : s.normals) n = glm::normalize(glm::inverse(glm::transpose(linear)) * n);
+  for (Vec4& t : s.tangents) t = Vec4(glm::normalize(linear * Vec3(t)), mirrors ? -t.w : t.w);
+  if (mirrors) std::swap(s.indices[1], s.indices[2]);
+  return s;
+}
+
+TEST(GlbWriter, InstancesWithUvsOfTheirOwnShareAMeshUnderTheirTransforms) {
+  Fixture fixture;
+  fixture.scene.instances[1].settings.receives = true;
+  fixture.scene.instances.push_back(fixture.scene.instances[0]);
+  fixture.scene.instances[2].worldFromObject =
+      Mat4(Vec4(0, 3, 0, 0), Vec4(-3, 0, 0, 0), Vec4(0, 0, 3, 0), Vec4(1, 2, 3, 1));
+  fixture.scene.instances[2].settings.texelDensityScale = 2.0f;
+  fixture.atlas.places = {{3, {0.5f, 0.25f}, {0.1f, 0.2f}}, {1, {0.25f, 0.25f}, {0, 0}}, {0, {0.5f, 0.5f}, {0.5f, 0}}};
+  for (int i = 1; i < 3; ++i) {
+    const Mat4& m = fixture.scene.instances[static_cast<std::size_t>(i)].worldFromObject;
+    fixture.atlas.surfaces.push_back(movedBy(fixture.atlas.surfaces[0], m));
+    fixture.atlas.surfaces.back().instance = i;
+    fixture.atlas.surfaces.back().page = fixture.atlas.places[static_cast<std::size_t>(i)].page;
+  }
+  const Scene scene = fixture.roundTrip();
+  ASSERT_EQ(scene.instances.size(), 3u);
+  EXPECT_EQ(scene.meshes.size(), 1u) << "mirrored and turned ones too";
+  const Primitive& source = fixture.scene.meshes[0].primitives[0];
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Instance& instance = scene.instances[i];
+    const Primitive& p = scene.primitive(instance.mesh, 0);
+    EXPECT_EQ(instance.worldFromObject, fixture.scene.instances[i].worldFromObject);
+    EXPECT_EQ(instance.lightmapPageOf(p), fixture.atlas.places[i].page);
+    EXPECT_EQ(instance.lightmap.scale, fixture.atlas.places[i].scale);
+    EXPECT_EQ(instance.lightmap.offset, fixture.atlas.places[i].offset);
+    EXPECT_EQ(p.positions, source.positions);
+    EXPECT_EQ(p.normals, source.normals);
+    EXPECT_EQ(p.uvSets.at(1), source.uvSets[1]);
+    EXPECT_EQ(p.indices, source.indices);
+    EXPECT_EQ(p.tangents[0], Vec4(0, 1, 0, -1));
+  }
+  EXPECT_EQ(scene.instances[2].settings.texelDensityScale, 2.0f);
+}
+
+TEST(GlbWriter, PagesStandAtPrimitivesWhereTheyDiffer) {
+  Fixture fixture;
+  fixture.scene.instances.resize(1);
+  fixture.scene.meshes[0].primitives.push_back(fixture.scene.meshes[0].primitives[0]);
+  const Scene some = fixture.roundTrip();  // the second primitive has no lightmap
+  EXPECT_EQ(some.instances[0].lightmapPageOf(some.primitive(0, 0)), 3);
+  EXPECT_EQ(some.instances[0].lightmapPageOf(some.primitive(0, 1)), -1);
+  fixture.atlas.surfaces.push_back(fixture.atlas.surfaces[0]);
+  fixture.atlas.surfaces[1].primitive = 1;
+  fixture.atlas.surfaces[1].page = 4;
+  const Scene both = fixture.roundTrip();
+  EXPECT_EQ(both.instances[0].lightmapPageOf(both.primitive(0, 0)), 3);
+  EXPECT_EQ(both.instances[0].lightmapPageOf(both.primitive(0, 1)), 4);
+}
+
+TEST(GlbWriter, ANodeThatShearsIsWrittenInTheWorld) {
+  Fixture fixture;
+  fixture.scene.instances[1].worldFromObject[1] = Vec4(1, 1, 0, 0);
+  const Scene scene = fixture.roundTrip();
+  EXPECT_EQ(scene.instances[1].worldFromObject, Mat4(1.0f));
+  EXPECT_EQ(scene.primitive(scene.instances[1].mesh, 0).positions[2], Vec3(1, 6, 0));
+}
+
+TEST(GlbWriter, FlattenedPrimitivesSayTheirPage) {
+  const Scene scene = Fixture().roundTrip(SceneForm::Flattened);
+  EXPECT_EQ(scene.primitive(scene.instances[0].mesh, 0).lightmapPage, 3);
+  EXPECT_EQ(scene.instances[0].lightmap.page, -1);
+}
+
 TEST(GlbWriter, PrimitivesWithoutLightmapMoveToTheWorld) {
-  const Scene scene = Fixture().roundTrip();
+  const Scene scene = Fixture().roundTrip(SceneForm::Flattened);
   ASSERT_EQ(scene.instances.size(), 2u);
   const Instance& right = scene.instances[1];
   EXPECT_FALSE(right.settings.receives);
   const Primitive& p = scene.primitive(right.mesh, 0);
-  EXPECT_EQ(p.lightmapPage, -1);
+  EXPECT_EQ(right.lightmapPageOf(p), -1);
   EXPECT_EQ(right.worldFromObject, Mat4(1.0f));
   EXPECT_EQ(p.positions[1], Vec3(-2, 5, 0));
   // The front is still on +z after the mirroring.
@@ -201,7 +278,7 @@ TEST(GlbWriter, LightsAndCamerasSurvive) {
 }
 
 TEST(GlbWriter, ContainerFollowsTheSpecification) {
-  const std::string glb = Fixture().encoded();
+  const std::string glb = Fixture().encoded(SceneForm::Instances);
   ASSERT_GT(glb.size(), 20u);
   const auto word = [&](std::size_t at) {
     std::uint32_t value = 0;

@@ -9,7 +9,8 @@ Conventions describeConventions(const Encoding& encoding) {
   conventions["units"] = "irradiance / pi, linear Rec. 709; metres, candela, lux, nits; no 683 anywhere; not exposed";
   conventions["frame"] = "t = TANGENT.xyz, n = NORMAL, b = TANGENT.w * cross(n, t) of scene.glb, orthonormalised";
   conventions["uv"] =
-      "TEXCOORD_1 of scene.glb, u right, v down; texel (x, y) covers u in [x, x+1)/width, v in [y, y+1)/height";
+      "TEXCOORD_1 of scene.glb, times extras.lumel.scale plus offset of its node where it has them, u right, v down; "
+      "texel (x, y) covers u in [x, x+1)/width, v in [y, y+1)/height";
   return conventions;
 }
 

@@ -112,15 +112,16 @@ Expected<void> readSky(const Reader& root, const fs::path& dir, Environment& sky
 }
 
 Expected<void> checkPages(const BakedScene& baked, const fs::path& file) {
-  for (const Mesh& mesh : baked.scene.meshes)
-    for (const Primitive& primitive : mesh.primitives) {
-      if (primitive.lightmapPage < 0) continue;
-      if (static_cast<std::size_t>(primitive.lightmapPage) >= baked.pages.size())
-        return inputError(file.string() + ": " + primitive.name + " lies on page " +
-                          std::to_string(primitive.lightmapPage) + ", bake.json knows " +
+  for (const Instance& instance : baked.scene.instances)
+    for (const Primitive& primitive : baked.scene.meshes[static_cast<std::size_t>(instance.mesh)].primitives) {
+      const int page = instance.lightmapPageOf(primitive);
+      if (page < 0) continue;
+      const std::string name = file.string() + ": '" + instance.name + "', " + primitive.name;
+      if (static_cast<std::size_t>(page) >= baked.pages.size())
+        return inputError(name + " lies on page " + std::to_string(page) + ", bake.json knows " +
                           std::to_string(baked.pages.size()) + "; bake again");
       if (primitive.uvSets.size() < 2 || primitive.uvSets[1].empty())
-        return inputError(file.string() + ": " + primitive.name + " has a lightmap page but no TEXCOORD_1; bake again");
+        return inputError(name + " has a lightmap page but no TEXCOORD_1; bake again");
     }
   return {};
 }

@@ -27,7 +27,7 @@ Expected<nlohmann::ordered_json> readBakeJson(const std::filesystem::path& dir);
 /// the only one before there was that key, and differs in nothing else. Errors: Input, naming place and cause.
 Expected<std::shared_ptr<const Encoding>> encodingOf(const nlohmann::ordered_json& bake, const std::string& file);
 
-/// Reads bake.json, scene.glb, the encoding's maps and the sky. Every lightmapPage of a primitive is a page that
+/// Reads bake.json, scene.glb, the encoding's maps and the sky. Every page that a node or primitive names
 /// exists. Errors: Input, naming the file that is missing, unreadable or does not fit the others.
 Expected<BakedScene> readBake(const std::filesystem::path& dir);
 

@@ -118,7 +118,7 @@ Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasRes
     if (!file) return file.error();
     return writeBytes(*file, bytes);
   };
-  const auto glb = encodeGlb(scene, atlas.atlas);
+  const auto glb = encodeGlb(scene, atlas.atlas, record.sceneForm);
   if (!glb) return glb.error();
   if (auto done = writeFile("scene.glb", std::span<const std::vector<std::uint8_t>>(*glb)); !done) return done;
   if (auto done = writeFile("bake.json", describeBake(scene, atlas, result, record)); !done) return done;

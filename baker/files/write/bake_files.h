@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "baker/bake/bake.h"
+#include "baker/files/write/glb_writer.h"
 #include "lightmap/atlas/atlas.h"
 #include "scene/base/expected.h"
 #include "scene/scene.h"
@@ -26,6 +27,7 @@ struct BakeRecord {
   BakeOptions bakeOptions;
   int dilate = 0;  // rings added around charts when writing
   bool half = false;
+  SceneForm sceneForm = SceneForm::Instances;
   int threads = 0;
   std::vector<StageTime> stages;
   std::size_t peakMemoryBytes = 0;

@@ -85,6 +85,26 @@ Json describeCharts(const Atlas& atlas) {
   return {{"columns", chartColumns()}, {"rows", std::move(rows)}};
 }
 
+/// Where the lightmap of each object lies: what the nodes of scene.glb say. An object with charts of ours on several
+/// pages has no page here: "charts" tells them.
+Json describeObjects(const Scene& scene, const Atlas& atlas) {
+  Json rows = Json::array();
+  for (std::size_t first = 0, last; first < atlas.surfaces.size(); first = last) {
+    const int instance = atlas.surfaces[first].instance;
+    LightmapPlace place{atlas.surfaces[first].page};
+    for (last = first; last < atlas.surfaces.size() && atlas.surfaces[last].instance == instance; ++last)
+      if (atlas.surfaces[last].page != place.page) place.page = -1;
+    const auto index = static_cast<std::size_t>(instance);
+    if (index < atlas.places.size() && atlas.places[index].page >= 0) place = atlas.places[index];
+    rows.push_back({instance,
+                    scene.instances[index].name,
+                    place.page >= 0 ? Json(place.page) : Json(nullptr),
+                    {place.scale.x, place.scale.y},
+                    {place.offset.x, place.offset.y}});
+  }
+  return {{"columns", {"instance", "name", "page", "scale", "offset"}}, {"rows", std::move(rows)}};
+}
+
 /// What a later bake needs to keep charts where they are (with the list of charts). Null without generated charts.
 Json describeLayout(const Atlas& atlas, const AtlasOptions& options) {
   if (!(atlas.chartDensity > 0)) return nullptr;
@@ -97,6 +117,7 @@ Json describeSceneUvs(const AtlasReport& report) {
   Json rows = Json::array();
   for (const UvReport& uv : report.sceneUvs)
     rows.push_back({{"mesh", uv.mesh},
+                    {"instances", uv.instances},
                     {"present", uv.present},
                     {"valid", uv.valid},
                     {"outOfRangeVertices", uv.outOfRangeVertices},
@@ -231,6 +252,7 @@ std::string describeBake(const Scene& scene, const AtlasResult& atlas, const Bak
                    {"generatedCharts", atlas.report.generatedCharts},
                    {"nonManifoldEdges", atlas.report.nonManifoldEdges},
                    {"degenerateTriangles", atlas.report.degenerateTriangles},
+                   {"objectsWithOwnUvs", atlas.report.objectsWithOwnUvs},
                    {"sceneUvs", describeSceneUvs(atlas.report)},
                    {"layout", describeLayout(atlas.atlas, record.atlasOptions)}};
   json["pages"] = describePages(atlas.atlas, result, encoding);
@@ -240,6 +262,7 @@ std::string describeBake(const Scene& scene, const AtlasResult& atlas, const Bak
   json["audit"] = describeAudit(result, atlas.atlas);
   json["warnings"] = warnings;
   json["notes"] = result.stats.notes;
+  json["objects"] = describeObjects(scene, atlas.atlas);
   json["charts"] = describeCharts(atlas.atlas);
   json["run"] = describeRun(result.stats, record);
   // Names come from files and need not be valid UTF-8.

@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <cstring>
-#include <numeric>
+#include <map>
 #include <set>
 #include <span>
 
 #include "baker/files/names/version.h"
 #include "baker/files/write/glb_buffer.h"
 #include "baker/files/write/glb_materials.h"
+#include "baker/files/write/glb_objects.h"
 
 namespace lumel {
 namespace {
@@ -16,60 +17,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::size_t toSize(int i) { return static_cast<std::size_t>(i); }
-
-/// A primitive that gets no lightmap, moved to world space like the surfaces.
-struct PlacedPrimitive {
-  std::vector<Vec3> positions;
-  std::vector<Vec3> normals;
-  std::vector<Vec4> tangents;
-  std::vector<std::uint32_t> sourceVertex;
-  std::vector<std::uint32_t> indices;
-};
-
-/// One triangle list as it goes into the file, whatever it came from.
-struct Geometry {
-  std::span<const Vec3> positions;
-  std::span<const Vec3> normals;
-  std::span<const Vec4> tangents;
-  std::span<const Vec2> lightmapUvs;            // empty without a lightmap
-  std::span<const std::uint32_t> sourceVertex;  // into the source primitive
-  std::span<const std::uint32_t> indices;
-
-  explicit Geometry(const Surface& s)
-      : positions(s.positions),
-        normals(s.normals),
-        tangents(s.tangents),
-        lightmapUvs(s.lightmapUvs),
-        sourceVertex(s.sourceVertex),
-        indices(s.indices) {}
-  explicit Geometry(const PlacedPrimitive& p)
-      : positions(p.positions),
-        normals(p.normals),
-        tangents(p.tangents),
-        sourceVertex(p.sourceVertex),
-        indices(p.indices) {}
-};
-
-PlacedPrimitive place(const Primitive& primitive, const Mat4& worldFromObject) {
-  const Mat3 linear(worldFromObject);
-  const bool mirrors = glm::determinant(linear) < 0.0f;
-  const Mat3 normalMatrix = cofactorMatrix(linear) * (mirrors ? -1.0f : 1.0f);
-  const auto unit = [](const Vec3& v, const Vec3& otherwise) {
-    const float length = glm::length(v);
-    return length > 0.0f && std::isfinite(length) ? v / length : otherwise;
-  };
-  PlacedPrimitive g;
-  for (const Vec3& p : primitive.positions) g.positions.push_back(Vec3(worldFromObject * Vec4(p, 1.0f)));
-  for (const Vec3& n : primitive.normals) g.normals.push_back(unit(normalMatrix * n, Vec3(0, 1, 0)));
-  for (const Vec4& t : primitive.tangents)
-    g.tangents.push_back(Vec4(unit(linear * Vec3(t), Vec3(1, 0, 0)), mirrors ? -t.w : t.w));
-  g.sourceVertex.resize(primitive.positions.size());
-  std::iota(g.sourceVertex.begin(), g.sourceVertex.end(), 0u);
-  g.indices = primitive.indices;
-  if (mirrors)
-    for (std::size_t i = 0; i + 2 < g.indices.size(); i += 3) std::swap(g.indices[i + 1], g.indices[i + 2]);
-  return g;
-}
 
 std::set<int> uvSetsOf(const Material& m) {
   std::set<int> sets;
@@ -80,7 +27,7 @@ std::set<int> uvSetsOf(const Material& m) {
 
 class GlbWriter {
  public:
-  GlbWriter(const Scene& scene, const Atlas& atlas) : scene_(scene), atlas_(atlas) {}
+  GlbWriter(const Scene& scene, const Atlas& atlas, SceneForm form) : scene_(scene), atlas_(atlas), form_(form) {}
 
   Expected<std::vector<std::vector<std::uint8_t>>> write() {
     auto materials = describeMaterials(scene_, buffer_);
@@ -98,42 +45,78 @@ class GlbWriter {
   }
 
   void addInstances() {
+    const std::span<const Surface> all(atlas_.surfaces);
     std::size_t next = 0;  // surfaces are ordered by instance, then primitive
     for (std::size_t i = 0; i < scene_.instances.size(); ++i) {
-      const Instance& instance = scene_.instances[i];
-      const Mesh& mesh = scene_.meshes[toSize(instance.mesh)];
-      Json primitives = Json::array();
-      std::vector<bool> written(mesh.primitives.size(), false);
-      for (; next < atlas_.surfaces.size() && atlas_.surfaces[next].instance == static_cast<int>(i); ++next) {
-        const Surface& surface = atlas_.surfaces[next];
-        written[toSize(surface.primitive)] = true;
-        if (surface.indices.empty()) continue;
-        Json json = describe(Geometry(surface), mesh.primitives[toSize(surface.primitive)]);
-        json["extras"]["lumel"]["page"] = surface.page;
-        primitives.push_back(std::move(json));
-      }
-      for (std::size_t k = 0; k < mesh.primitives.size(); ++k)
-        if (!written[k] && !mesh.primitives[k].indices.empty())
-          primitives.push_back(
-              describe(Geometry(place(mesh.primitives[k], instance.worldFromObject)), mesh.primitives[k]));
-      if (primitives.empty()) continue;
-      Json node = {{"name", instance.name}, {"mesh", meshes_.size()}};
-      addSettings(node, instance.settings);
-      meshes_.push_back(
-          {{"name", mesh.name.empty() ? instance.name : mesh.name}, {"primitives", std::move(primitives)}});
-      addNode(std::move(node));
+      const std::size_t first = next;
+      while (next < all.size() && all[next].instance == static_cast<int>(i)) ++next;
+      addInstance(i, all.subspan(first, next - first));
     }
+  }
+
+  void addInstance(std::size_t index, std::span<const Surface> surfaces) {
+    const Instance& instance = scene_.instances[index];
+    Json node = {{"name", instance.name}, {"mesh", 0}};
+    if (form_ == SceneForm::Flattened || !isNodeTransform(instance.worldFromObject)) {
+      std::vector<GlbPart> parts = partsInWorld(scene_, instance, surfaces);
+      if (parts.empty()) return;
+      node["mesh"] = addMesh(instance, parts, true);
+    } else {
+      const bool hasPlace = index < atlas_.places.size() && atlas_.places[index].page >= 0;
+      std::vector<GlbPart> parts = partsInObject(scene_, instance, surfaces, hasPlace);
+      if (parts.empty()) return;
+      // Where only some primitives have a lightmap, or they lie on several pages, they say so themselves.
+      const bool pagesDiffer =
+          std::any_of(parts.begin(), parts.end(), [&](const GlbPart& p) { return p.page != parts[0].page; });
+      node["mesh"] = hasPlace || surfaces.empty() ? sharedMesh(instance, std::move(parts), pagesDiffer)
+                                                  : addMesh(instance, parts, pagesDiffer);
+      if (instance.worldFromObject != Mat4(1.0f)) node["matrix"] = toJson(instance.worldFromObject);
+      if (!surfaces.empty() && (hasPlace || !pagesDiffer)) {
+        const LightmapPlace place = hasPlace ? atlas_.places[index] : LightmapPlace{surfaces[0].page};
+        Json& extras = node["extras"]["lumel"];
+        if (!pagesDiffer) extras["page"] = place.page;
+        extras["scale"] = {place.scale.x, place.scale.y};
+        extras["offset"] = {place.offset.x, place.offset.y};
+      }
+    }
+    addSettings(node, instance.settings);
+    addNode(std::move(node));
+  }
+
+  std::size_t addMesh(const Instance& instance, std::span<const GlbPart> parts, bool pages) {
+    const Mesh& mesh = scene_.meshes[toSize(instance.mesh)];
+    Json primitives = Json::array();
+    for (const GlbPart& part : parts) {
+      Json json = describe(part, mesh.primitives[toSize(part.primitive)]);
+      if (pages && part.page >= 0) json["extras"]["lumel"]["page"] = part.page;
+      primitives.push_back(std::move(json));
+    }
+    meshes_.push_back({{"name", mesh.name.empty() ? instance.name : mesh.name}, {"primitives", std::move(primitives)}});
+    return meshes_.size() - 1;
+  }
+
+  /// The mesh that an earlier instance of equal look wrote, or a new one. Equal pages too, if the mesh states them.
+  std::size_t sharedMesh(const Instance& instance, std::vector<GlbPart> parts, bool pages) {
+    std::vector<SharedMesh>& known = shared_[instance.mesh];
+    for (const SharedMesh& mesh : known)
+      if (mesh.pages == pages && sameButForPages(mesh.parts, parts) &&
+          (!pages || std::equal(parts.begin(), parts.end(), mesh.parts.begin(),
+                                [](const GlbPart& a, const GlbPart& b) { return a.page == b.page; })))
+        return mesh.index;
+    const std::size_t index = addMesh(instance, parts, pages);
+    known.push_back({index, pages, std::move(parts)});
+    return index;
   }
 
   static void addSettings(Json& node, const ObjectSettings& settings) {
     const ObjectSettings usual;
     if (settings.texelDensityScale != usual.texelDensityScale)
-      node["extras"]["lumel"]["scale"] = settings.texelDensityScale;
+      node["extras"]["lumel"]["density"] = settings.texelDensityScale;
     if (settings.casts != usual.casts) node["extras"]["lumel"]["casts"] = settings.casts;
     if (settings.receives != usual.receives) node["extras"]["lumel"]["receives"] = settings.receives;
   }
 
-  Json describe(const Geometry& g, const Primitive& source) {
+  Json describe(const GlbPart& g, const Primitive& source) {
     Json attributes = {{"POSITION", buffer_.addVec3(g.positions, true)}, {"NORMAL", buffer_.addVec3(g.normals)}};
     if (!g.tangents.empty()) attributes["TANGENT"] = buffer_.addVec4(g.tangents);
     addUvs(attributes, g, source);
@@ -148,7 +131,7 @@ class GlbWriter {
   }
 
   /// TEXCOORD numbers must follow each other from 0, so sets in between that nobody reads repeat another's data.
-  void addUvs(Json& attributes, const Geometry& g, const Primitive& source) {
+  void addUvs(Json& attributes, const GlbPart& g, const Primitive& source) {
     std::set<int> wanted = uvSetsOf(scene_.materials[toSize(source.material)]);
     if (!source.uvSets.empty() && !source.uvSets[0].empty()) wanted.insert(0);
     std::vector<int> accessors;  // by written set; -1: nothing of its own
@@ -274,8 +257,16 @@ class GlbWriter {
     return pieces;
   }
 
+  struct SharedMesh {
+    std::size_t index = 0;  // into meshes_
+    bool pages = false;     // its primitives state their pages
+    std::vector<GlbPart> parts;
+  };
+
   const Scene& scene_;
   const Atlas& atlas_;
+  const SceneForm form_;
+  std::map<int, std::vector<SharedMesh>> shared_;  // by mesh of the scene
   GlbBuffer buffer_;
   Json nodes_ = Json::array();
   Json rootNodes_ = Json::array();
@@ -286,8 +277,8 @@ class GlbWriter {
 
 }  // namespace
 
-Expected<std::vector<std::vector<std::uint8_t>>> encodeGlb(const Scene& scene, const Atlas& atlas) {
-  return GlbWriter(scene, atlas).write();
+Expected<std::vector<std::vector<std::uint8_t>>> encodeGlb(const Scene& scene, const Atlas& atlas, SceneForm form) {
+  return GlbWriter(scene, atlas, form).write();
 }
 
 }  // namespace lumel
