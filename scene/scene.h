@@ -11,6 +11,7 @@
 
 #include "scene/base/math.h"
 #include "scene/image.h"
+#include "scene/light.h"
 
 namespace lumel {
 
@@ -119,29 +120,6 @@ struct ImageSource {
 /// level of albedo 1 is a furnace. An emission map that is missing counts as black.
 inline constexpr float kMissingColor = 0.6f;
 
-/// Sources of light brighter than this (candela, lux, nits) are cut to it, so that sums of light stay floats.
-inline constexpr float kMostIntensity = 1e32f;
-
-enum class LightType { Point, Spot, Directional };
-
-/// Returns the name that KHR_lights_punctual gives a type: "point", "spot", "directional".
-inline const char* nameOf(LightType type) {
-  return type == LightType::Point ? "point" : type == LightType::Spot ? "spot" : "directional";
-}
-
-/// KHR_lights_punctual. Point and spot: intensity in candela (lm/sr); directional: lux on a facing surface.
-struct Light {
-  std::string name;
-  LightType type = LightType::Point;
-  Vec3 color{1, 1, 1};  // linear
-  float intensity = 1.0f;
-  Vec3 position{0, 0, 0};    // world
-  Vec3 direction{0, 0, -1};  // world, unit: where the light travels
-  float range = 0.0f;        // metres; 0 = unlimited; attenuation window as the extension recommends
-  float innerConeAngle = 0.0f;
-  float outerConeAngle = kPi / 4;
-};
-
 struct Camera {
   std::string name;
   Mat4 worldFromCamera{1.0f};  // looks along -z, y up
@@ -165,6 +143,7 @@ struct Environment {
 /// What loading met that the user may want to know.
 struct LoadReport {
   std::vector<std::string> warnings;    // one line each
+  std::vector<std::string> notes;       // one line each: what was taken for granted, and how to overrule it
   std::size_t degenerateTriangles = 0;  // dropped: zero area or repeated vertices
   std::size_t skippedPrimitives = 0;    // points and lines
 };

@@ -65,6 +65,7 @@ struct BakeResult {
   Seams seams;  // for finishPages; none where the options say so
   BakeStats stats;
   std::optional<AuditReport> audit;  // auditBake
+  std::vector<Image> shadowMasks;    // RGBA, by page: bakeShadowMasks; empty: not asked for
 };
 
 class LitScene;

@@ -7,6 +7,7 @@
 #include "baker/bake/bake.h"
 #include "baker/bake/finish.h"
 #include "baker/bake/quality.h"
+#include "baker/bake/shadow_masks.h"
 #include "baker/commands/command.h"
 #include "baker/commands/scene_arguments.h"
 #include "baker/commands/stage_clock.h"
@@ -47,6 +48,7 @@ struct BakeArguments : SceneArguments {
   int dilate = kDilateByPadding;
   bool half = false;
   bool flatten = false;
+  bool shadowMasks = false;
   bool strict = false;
   int threads = 0;
   Quality quality = Quality::Production;
@@ -78,6 +80,9 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
   options.flag("indirect-only", a.bake.indirectOnly,
                "Leave out light that comes straight from lights, shining surfaces and the sky: the program that shows "
                "the scene adds it");
+  options.flag("shadow-masks", a.shadowMasks,
+               "Also bake how much of up to four lamps marked by extras.lumel.light.shadow_mask each texel sees, into "
+               "one RGBA map per page");
   declareSkyAndSides(options, a);
   options.choice(
       "projection", a.projection, {"raw", "flat", "fit", "signed"},
@@ -184,6 +189,23 @@ Expected<void> check(const BakeArguments& a, const OptionTable& options) {
     return usageError("--samples " + std::to_string(a.samples) + " is more than --max-samples " +
                       std::to_string(a.bake.maxSamples));
   return checkSky(a);
+}
+
+/// More samples of a shadow are not told apart in 8 bits.
+constexpr int kMostMaskSamples = 256;
+
+/// Warns where no lamp has a shadow mask. Errors: Input, where more have one than a map has channels.
+Expected<void> checkShadowMasks(const BakeArguments& a, Scene& scene) {
+  if (!a.shadowMasks) return {};
+  const std::vector<std::size_t> marked = lightsWithMask(scene.lights);
+  if (marked.empty())
+    scene.report.warnings.push_back(
+        "--shadow-masks: no lamp is marked; give those that shall have one extras.lumel.light = {\"shadow_mask\": "
+        "true}");
+  if (marked.size() <= kMostShadowMasks) return {};
+  return inputError(a.scene.string() + ": light '" + scene.lights[marked[kMostShadowMasks]].name + "' is number " +
+                    std::to_string(kMostShadowMasks + 1) + " of " + std::to_string(marked.size()) +
+                    " with a shadow mask; a map holds four, take extras.lumel.light.shadow_mask from the others");
 }
 
 void printSettings(const nlohmann::ordered_json& settings) {
@@ -331,7 +353,9 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   if (!scene) return scene.error();
   if (auto kept = keepObjects(a.objects, *scene); !kept) return kept.error();
   if (a.half) warnOfHalf(*scene);
+  if (auto checked = checkShadowMasks(a, *scene); !checked) return checked;
   if (!context.quiet) printSettings(record.settings);
+  if (!context.quiet) printNotes(scene->report.notes);
   if (!context.quiet) printWarnings(scene->report.warnings);
   if (progress.cancelled()) return interrupted();
 
@@ -366,6 +390,15 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
                                     .isSigned = record.bakeOptions.encoding->isSigned()});
   baked->stats.errors = statedErrors(baked->pages, *record.bakeOptions.encoding);
   if (a.half) cutToHalf(*baked);
+  if (a.shadowMasks) {
+    clock.start("shadow masks");
+    auto masks = bakeShadowMasks(
+        **lit, scene->lights, atlas->atlas, texels, baked->pages,
+        {.samples = std::min(record.bakeOptions.samples, kMostMaskSamples), .rings = dilate, .seed = a.bake.seed},
+        progress);
+    if (!masks) return masks.error();
+    baked->shadowMasks = *std::move(masks);
+  }
   if (audits(a)) {
     clock.start("audit");
     auditBake(**lit, atlas->atlas, texels, record.bakeOptions, objectNames(*scene), *baked);

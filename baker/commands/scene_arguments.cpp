@@ -36,6 +36,11 @@ void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas) {
 }
 
 void declareSky(OptionTable& options, SceneArguments& a) {
+  options.choice(
+      "light-units", a.lightUnits, {"auto", "gltf", "blender", "blender-raw"},
+      "Unit of the lamps of a glTF file: candela and lux as it says (gltf); 683 times watts, as Blender's "
+      "exporter writes by default (blender) or plain watts (blender-raw), so that lamps and shining surfaces "
+      "match; auto: by the program that wrote the file");
   options.color("sky-color", a.skyColor, {0.0f}, "Radiance of an even sky in nits, red green blue [none]");
   options.path("sky", a.sky, "Sky image: equirectangular .hdr or .exr [none]");
   options
@@ -85,7 +90,7 @@ static void treatSkyDomes(Scene& scene, SkyDome treatment) {
 }
 
 Expected<Scene> loadSceneUnderSky(const SceneArguments& a) {
-  auto scene = loadScene(a.scene, {.allowOutsidePaths = a.allowOutsidePaths});
+  auto scene = loadScene(a.scene, {.allowOutsidePaths = a.allowOutsidePaths, .lightUnits = a.lightUnits});
   if (!scene) return scene;
   if (!a.sky.empty()) {
     auto sky = loadEnvironment(a.sky);
@@ -118,9 +123,15 @@ Expected<Scene> loadLitScene(const SceneArguments& a, const Progress& progress) 
 
 bool hasLight(const Scene& scene) {
   const auto emits = [](const Material& m) { return m.emission != Vec3(0.0f) && !m.unlit; };
-  const auto shines = [](const Light& l) { return l.intensity > 0.0f && l.color != Vec3(0.0f); };
+  const auto shines = [](const Light& l) {
+    return l.intensity > 0.0f && l.color != Vec3(0.0f) && l.mode != LightMode::None;
+  };
   return !scene.environment.isBlack() || std::any_of(scene.lights.begin(), scene.lights.end(), shines) ||
          std::any_of(scene.materials.begin(), scene.materials.end(), emits);
+}
+
+void printNotes(const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) std::fprintf(stderr, "lumel: %s\n", note.c_str());
 }
 
 void printWarnings(const std::vector<std::string>& warnings) {

@@ -9,6 +9,7 @@
 #include "lightmap/atlas/atlas.h"
 #include "scene/base/expected.h"
 #include "scene/base/progress.h"
+#include "scene/files/load_options.h"
 #include "scene/scene.h"
 
 namespace lumel {
@@ -30,6 +31,7 @@ struct SceneArguments {
   bool allowOutsidePaths = false;
   DoubleSided doubleSided = DoubleSided::Lit;
   SkyDome skyDome = SkyDome::Keep;
+  LightUnits lightUnits = LightUnits::Auto;
   Vec3 skyColor{0, 0, 0};
   std::filesystem::path sky;
   float skyRotation = 0.0f;
@@ -55,6 +57,8 @@ Expected<Scene> loadLitScene(const SceneArguments& a, const Progress& progress);
 /// Whether anything shines.
 bool hasLight(const Scene& scene);
 
+/// What was taken for granted, on stderr.
+void printNotes(const std::vector<std::string>& notes);
 /// The first few on stderr.
 void printWarnings(const std::vector<std::string>& warnings);
 

@@ -56,13 +56,18 @@ Json describeMaterials(const Scene& scene) {
 
 Json describeLights(const Scene& scene) {
   Json list = Json::array();
-  for (const Light& light : scene.lights)
-    list.push_back({{"name", light.name},
-                    {"type", nameOf(light.type)},
-                    {light.type == LightType::Directional ? "lux" : "candela", light.intensity},
-                    {"color", toJson(light.color)},
-                    {"position", toJson(light.position)},
-                    {"direction", toJson(light.direction)}});
+  for (const Light& light : scene.lights) {
+    Json json = {
+        {"name", light.name},           {"type", nameOf(light.type)},         {unitOf(light.type), light.intensity},
+        {"color", toJson(light.color)}, {"position", toJson(light.position)}, {"direction", toJson(light.direction)}};
+    if (light.type == LightType::Rectangle) json["sizeMeters"] = {light.size.x, light.size.y};
+    if (light.radius > 0.0f) json["radiusMeters"] = light.radius;
+    if (light.halfAngle > 0.0f) json["angleDegrees"] = light.halfAngle * 360.0f * kInvPi;
+    if (light.profile) json["profileCandela"] = light.profile->mostCandela;
+    if (light.mode != LightMode::All) json["mode"] = nameOf(light.mode);
+    if (light.hasShadowMask) json["shadowMask"] = true;
+    list.push_back(std::move(json));
+  }
   return list;
 }
 
@@ -189,6 +194,7 @@ Json describeScene(const Scene& scene, const AtlasOptions& options) {
   UvFigures uvs = describeUvs(scene, options);
   json["lightmapUvs"] = std::move(uvs.json);
   json["estimate"] = estimate(uvs, sceneSize(scene), options);
+  if (!scene.report.notes.empty()) json["notes"] = scene.report.notes;
   json["warnings"] = scene.report.warnings;
   return json;
 }

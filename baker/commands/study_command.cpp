@@ -59,6 +59,7 @@ Expected<void> runStudy(const StudyArguments& a, CommandContext& context) {
   if (!scene) return scene.error();
   splitLongTriangles(*scene, a.study.atlas);
   if (!hasLight(*scene)) return inputError(a.scene.string() + ": nothing in it shines; give --sky-color or --sky");
+  if (!context.quiet) printNotes(scene->report.notes);
   if (!context.quiet) printWarnings(scene->report.warnings);
   if (!context.quiet) std::fprintf(stderr, "study of %s: a reference, then the candidates\n", a.scene.c_str());
   StudyOptions options = a.study;

@@ -40,7 +40,7 @@ GatherIntegrator::GatherIntegrator(const LightTransport& transport, const Encodi
              .lastDepth = options.bounces < 0 ? kLongestPath : options.bounces,
              .levels = levelsFor(options.bounces),
              .indirectOnly = options.indirectOnly} {
-  if (!options.indirectOnly) scene_.strategies = lightStrategies(transport, true);
+  if (!options.indirectOnly) scene_.strategies = lightStrategies(transport.atTexels(), true);
 }
 
 std::uint32_t GatherIntegrator::mostSamples() const {

@@ -64,13 +64,14 @@ void gatherWave(const LightTransport& transport, const SurfaceCache& surfaces, s
     samples.setTexel(static_cast<int>(lane), samplers[lane]);
   }
   const ReceiverLanes receivers{active, p, none, none, p, true};
+  const LightTransport straight = transport.atTexels();
   RayPacket packet;
   TexelMap::Lookup lookup;
   const auto count = static_cast<std::uint32_t>(std::max(1, options.samples));
   for (std::uint32_t s = 0; s < count; ++s) {
     samples.setSampleOfAll(s);
     directLight(
-        transport, receivers, samples, 0, TraceMode::Packet, kSphereDensity,
+        straight, receivers, samples, 0, TraceMode::Packet, kSphereDensity,
         [&](int lane, const Vec3& wi, const Vec3& light) { sink.add(static_cast<std::size_t>(lane), wi, light); });
     const UnitSquareLanes u = samples.draw2D(kDirection);
     packet.clear();

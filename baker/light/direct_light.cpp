@@ -82,19 +82,25 @@ std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& st
                         const SampleLanes& samples, std::uint32_t patternBase, const SurfaceDensity& density,
                         SampledLight& sampled, const EnvironmentLight::Places* sky, PunctualChoice* punctual) {
   LightSampleLanes taken;
+  UnitSquareLanes square;
+  const UnitSquareLanes* points = nullptr;
+  if (strategy.kind <= LightStrategy::OnePunctual && transport.punctual.hasShapes()) {
+    square = samples.draw2D(patternBase + kPunctualPoint);
+    points = &square;
+  }
   switch (strategy.kind) {
     case LightStrategy::EveryPunctual:
       if (punctual != nullptr)
         transport.punctual.sample(receivers, samples.draw1D(patternBase + kPunctual), punctual->learnt, taken,
-                                  punctual->group);
+                                  punctual->group, points);
       else
-        transport.punctual.sample(receivers, samples.draw1D(patternBase + kPunctual), taken);
+        transport.punctual.sample(receivers, samples.draw1D(patternBase + kPunctual), taken, points);
       break;
     case LightStrategy::NearPunctual:
-      transport.punctual.sampleNear(receivers, samples.draw1D(patternBase + kPunctual), taken);
+      transport.punctual.sampleNear(receivers, samples.draw1D(patternBase + kPunctual), taken, points);
       break;
     case LightStrategy::OnePunctual:
-      transport.punctual.sampleOne(strategy.light, receivers, taken);
+      transport.punctual.sampleOne(strategy.light, receivers, taken, points);
       break;
     case LightStrategy::Emissive:
       transport.emissive.sample(receivers.p, receivers.active, samples.draw1D(patternBase + kEmitter),

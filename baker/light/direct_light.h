@@ -14,6 +14,8 @@ namespace lumel {
 
 /// The sample patterns that one receiver's decisions use, counted from a base.
 enum LightPattern : std::uint32_t { kPunctual, kEmitter, kEmitterPoint, kSun, kSky, kLightPatterns };
+/// Added to the base for the point on a lamp that is more than a point, far from all other patterns.
+inline constexpr std::uint32_t kPunctualPoint = 0x40000000u;
 
 /// Names one way to take a light sample. The strategies that a scene needs (lightStrategies) add up to its direct
 /// light.

@@ -16,6 +16,13 @@ struct LightTransport {
   const PunctualLights& punctual;
   const EmissiveTriangles& emissive;
   const EnvironmentLight& environment;
+  /// Those of `punctual` whose light counts where it arrives straight (LightMode::All); null: all of them.
+  const PunctualLights* straight = nullptr;
+
+  /// The same scene with the lamps whose light texels take straight: `punctual` is for hits.
+  LightTransport atTexels() const {
+    return {rays, materials, straight != nullptr ? *straight : punctual, emissive, environment, straight};
+  }
 
   /// Tells whether a ray can bring light back by itself, by what it hits or by leaving the scene.
   bool raysSeeLight() const { return !emissive.empty() || environment.shines(); }

@@ -1,8 +1,18 @@
 #include "baker/light/lit_scene.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace lumel {
+namespace {
+
+std::unique_ptr<PunctualLights> straightLights(const std::vector<Light>& lights) {
+  if (std::ranges::none_of(lights, [](const Light& light) { return light.mode == LightMode::Indirect; }))
+    return nullptr;
+  return std::make_unique<PunctualLights>(lights, [](LightMode mode) { return mode == LightMode::All; });
+}
+
+}  // namespace
 
 LitScene::LitScene(const Scene& scene, std::unique_ptr<Materials> materials, std::unique_ptr<RayScene> rays,
                    std::vector<std::string> notes, bool hasAlbedo)
@@ -10,10 +20,11 @@ LitScene::LitScene(const Scene& scene, std::unique_ptr<Materials> materials, std
       hasAlbedo_(hasAlbedo),
       materials_(std::move(materials)),
       rays_(std::move(rays)),
-      punctual_(scene.lights),
+      punctual_(scene.lights, [](LightMode mode) { return mode != LightMode::None; }),
+      straight_(straightLights(scene.lights)),
       emissive_(*rays_, *materials_),
       environment_(scene.environment),
-      transport_{*rays_, *materials_, punctual_, emissive_, environment_} {}
+      transport_{*rays_, *materials_, punctual_, emissive_, environment_, straight_.get()} {}
 
 Expected<std::unique_ptr<LitScene>> LitScene::build(const Scene& scene, bool needsAlbedo) {
   std::vector<std::string> notes;

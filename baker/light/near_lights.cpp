@@ -111,13 +111,15 @@ NearLights nearLightsOf(const PunctualLights& lights, const TexelFootprint& foot
   const std::vector<std::size_t> around = lightsAround(lights, least, most, reach);
   if (around.empty() || !(reach > 0.0f)) return near;
   near.perReach2 = 1.0f / (reach * reach);
-  for (const std::size_t light : around)
+  for (const std::size_t light : around) {
+    if (!lights.isSmall(light, reach)) continue;
     if (NearLight one(light, lights.source(light).position, reach, footprint); one.sees()) near.lights.push_back(one);
+  }
   return near;
 }
 
 NearSample sampleNear(const LightTransport& transport, const Atlas& atlas, const TexelFootprint& footprint,
-                      const NearLight& near, Vec2 u) {
+                      const NearLight& near, Vec2 u, Vec2 onLight) {
   const NearLight::Sample chosen = near.sample(u);
   NearSample sample;
   if (!(chosen.perIntensity > 0.0f)) return sample;
@@ -125,11 +127,12 @@ NearSample sampleNear(const LightTransport& transport, const Atlas& atlas, const
   const PunctualLights::Source& source = transport.punctual.source(near.light());
   sample.receiver = receiverAt(transport.rays, atlas, point);
   sample.frame = point.frame;
-  sample.position = source.position;
-  const Vec3 facing = source.facing(point.position, sample.wi);
+  Vec3 facing;
+  transport.punctual.sampleAt(near.light(), point.position, onLight, sample.wi, sample.target, facing);
   const Vec3 toLight = source.position - point.position;
+  const bool above = source.shape < 0 || glm::dot(toLight, sample.receiver.ng) > 0.0f;
   const bool sees = glm::dot(sample.wi, sample.receiver.ng) > 0.0f && glm::dot(sample.wi, sample.receiver.ns) > 0.0f;
-  if (sees) sample.light = facing * glm::dot(toLight, toLight) * chosen.perIntensity;
+  if (above && sees) sample.light = facing * glm::dot(toLight, toLight) * chosen.perIntensity;
   return sample;
 }
 

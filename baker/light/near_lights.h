@@ -18,6 +18,7 @@ namespace lumel {
 /// Within its reach R of a receiver a light of irradiance E is taken as two: E d^2 / R^2, which is bounded and sampled
 /// like all others at points of the texel, and the rest, E (1 - d^2 / R^2), sampled by the solid angle that the texel
 /// fills as the light sees it, which takes the peak of 1 / d^2 away:
+/// A light that is more than a point counts so where its centre lies above the texel and it is small against R.
 ///     1/|A| Integral_A E (1 - d^2 / R^2) K / cosTheta dA = 1/|A| Integral I (1 - d^2 / R^2) K / cosTheta dw
 /// K being a map's kernel and I the intensity towards the point. Both parts are smooth, so nothing depends on luck.
 class NearLight {
@@ -77,12 +78,13 @@ bool isAnyLightNear(const PunctualLights& lights, const Vec3& least, const Vec3&
 struct NearSample {
   Receiver receiver;
   Frame frame;
-  Vec3 wi{0};        // unit, towards the light
-  Vec3 position{0};  // of the light
-  Vec3 light{0};     // radiance over density
+  Vec3 wi{0};      // unit, towards the light
+  Vec3 target{0};  // end of the shadow ray
+  Vec3 light{0};   // radiance over density
 };
-/// Takes a sample of `near`. Its light is zero where none could arrive.
+/// Takes a sample of `near`: u chooses the point of the texel, `onLight` the one of a light that is more than a point.
+/// Its light is zero where none could arrive.
 NearSample sampleNear(const LightTransport& transport, const Atlas& atlas, const TexelFootprint& footprint,
-                      const NearLight& near, Vec2 u);
+                      const NearLight& near, Vec2 u, Vec2 onLight);
 
 }  // namespace lumel

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "baker/rays/sampling.h"
+#include "scene/base/check.h"
 
 namespace lumel {
 namespace {
@@ -100,19 +101,28 @@ Vec3 facingIrradiance(const Light& light, const Vec3& p, Vec3& wi) {
   return PunctualLights::Source(light).facing(p, wi);
 }
 
-PunctualLights::PunctualLights(const std::vector<Light>& lights) {
+PunctualLights::PunctualLights(const std::vector<Light>& lights, bool (*ofMode)(LightMode)) {
+  std::vector<const Light*> kept;
   for (const bool directional : {true, false}) {
-    for (const Light& light : lights)
-      if (sends(light) && (light.type == LightType::Directional) == directional) lights_.emplace_back(light);
+    for (const Light& light : lights) {
+      if (!sends(light) || (light.type == LightType::Directional) != directional) continue;
+      if (ofMode != nullptr && !ofMode(light.mode)) continue;
+      kept.push_back(&light);
+      lights_.emplace_back(light);
+      if (!LightShape::isOne(light)) continue;
+      lights_.back().shape = static_cast<int>(shapes_.size());
+      shapes_.emplace_back(light);
+    }
     if (directional) directional_ = lights_.size();
   }
   for (std::size_t i = directional_; i < lights_.size(); ++i) byX_.push_back(static_cast<std::uint32_t>(i));
   std::ranges::stable_sort(byX_, {}, [&](std::uint32_t light) { return lights_[light].position.x; });
   if (lights_.size() - directional_ <= kLocalLights) return;
   std::vector<LightBounds> bounds(lights_.size());  // those of directional lights stay without power
-  std::size_t i = directional_;
-  for (const Light& light : lights)
-    if (light.type != LightType::Directional && sends(light)) bounds[i++] = boundsOf(light);
+  for (std::size_t i = directional_; i < lights_.size(); ++i) {
+    const int shape = lights_[i].shape;
+    bounds[i] = shape < 0 ? boundsOf(*kept[i]) : shapes_[static_cast<std::size_t>(shape)].bounds();
+  }
   tree_ = LightTree(bounds);
 }
 
@@ -126,8 +136,47 @@ static void boundNearLight(const ReceiverLanes& at, LightSampleLanes& samples) {
   }
 }
 
-void PunctualLights::sampleOne(std::size_t index, const ReceiverLanes& at, LightSampleLanes& samples) const {
+void PunctualLights::sampleShape(const LightShape& shape, std::size_t lane, float probability, const ReceiverLanes& at,
+                                 const UnitSquareLanes& points, LightSampleLanes& samples) const {
+  const Vec3 p = at.p[lane];
+  LightShape::Sample sample = shape.sample(p, points[static_cast<int>(lane)]);
+  if (at.perReach2 != nullptr && at.perReach2[lane] > 0.0f && samples.distant[lane] == 0 &&
+      shape.boundRadius() * shape.boundRadius() * at.perReach2[lane] < 1.0f) {
+    const Vec3 toLight = shape.position() - p;
+    if (glm::dot(toLight, at.ng[lane]) > 0.0f)
+      sample.weight *= std::min(1.0f, glm::dot(toLight, toLight) * at.perReach2[lane]);
+  }
+  samples.wi.set(lane, sample.wi);
+  samples.weight.set(lane, sample.weight / probability);
+  samples.target.set(lane, sample.target);
+}
+
+void PunctualLights::sampleAt(std::size_t index, const Vec3& p, const Vec2& u, Vec3& wi, Vec3& target,
+                              Vec3& facing) const {
   const Source& light = lights_[index];
+  if (light.shape < 0) {
+    facing = light.facing(p, wi);
+    target = light.position;
+    return;
+  }
+  const LightShape::Sample sample = shapes_[static_cast<std::size_t>(light.shape)].sample(p, u);
+  wi = sample.wi;
+  target = sample.target;
+  facing = sample.weight;
+}
+
+void PunctualLights::sampleOne(std::size_t index, const ReceiverLanes& at, LightSampleLanes& samples,
+                               const UnitSquareLanes* points) const {
+  const Source& light = lights_[index];
+  if (light.shape >= 0) {
+    LUMEL_CHECK(points != nullptr);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      samples.pdf[lane] = 0.0f;
+      samples.distant[lane] = light.distant ? 1 : 0;
+      sampleShape(shapes_[static_cast<std::size_t>(light.shape)], lane, 1.0f, at, *points, samples);
+    }
+    return;
+  }
   if (!light.distant) {
     sampleNearby(light, at.p, samples);
     return boundNearLight(at, samples);
@@ -142,6 +191,8 @@ void PunctualLights::sampleOne(std::size_t index, const ReceiverLanes& at, Light
 }
 
 float PunctualLights::importance(std::size_t light, const Vec3& p, const Vec3& n) const {
+  if (const int shape = lights_[light].shape; shape >= 0)
+    return shapes_[static_cast<std::size_t>(shape)].importance(p, n);
   Vec3 wi;
   const Vec3 facing = lights_[light].facing(p, wi);
   return importanceOf(facing, wi, n);
@@ -170,12 +221,15 @@ struct alignas(64) PunctualLights::Chosen {
 
 /// Chooses among at most kLocalLights lights, lane by lane in vector code.
 LUMEL_FOR_EACH_CPU void PunctualLights::chooseAmongFew(std::span<const Source> few, const ReceiverLanes& at,
-                                                       const UnitLanes& u, Chosen& chosen) {
+                                                       const UnitLanes& u, Chosen& chosen) const {
   alignas(64) float each[kLocalLights][kLanes];
   alignas(64) float total[kLanes] = {};
   for (std::size_t k = 0; k < few.size(); ++k) {
     const Source light = few[k];
-    if (light.distant) {
+    if (light.shape >= 0) {
+      const LightShape& shape = shapes_[static_cast<std::size_t>(light.shape)];
+      for (std::size_t lane = 0; lane < kLanes; ++lane) each[k][lane] = shape.importance(at.p[lane], at.ns[lane]);
+    } else if (light.distant) {
       for (std::size_t lane = 0; lane < kLanes; ++lane)
         each[k][lane] = importanceOf(light.power, -light.direction, at.ns[lane]);
     } else {
@@ -229,7 +283,7 @@ LUMEL_FOR_EACH_CPU void PunctualLights::sampleChosen(const Chosen& chosen, const
 }
 
 void PunctualLights::choose(std::size_t first, const ReceiverLanes& at, const UnitLanes& u,
-                            LightSampleLanes& samples) const {
+                            const UnitSquareLanes* points, LightSampleLanes& samples) const {
   Chosen chosen;
   if (tree_.empty() && lights_.size() - first <= kLocalLights) {
     chooseAmongFew(std::span(lights_).subspan(first), at, u, chosen);
@@ -237,23 +291,31 @@ void PunctualLights::choose(std::size_t first, const ReceiverLanes& at, const Un
   } else {
     chooseWithTree(first, at, u, nullptr, chosen);
   }
-  sampleChosen(chosen, at, samples);
+  sampleChosen(chosen, at, points, samples);
 }
 
 void PunctualLights::sample(const ReceiverLanes& at, const UnitLanes& u, const LearntChoice& learnt,
-                            LightSampleLanes& samples, LaneFlags& chosenGroup) const {
+                            LightSampleLanes& samples, LaneFlags& chosenGroup, const UnitSquareLanes* points) const {
   Chosen chosen;
   chooseWithTree(0, at, u, &learnt, chosen);
   const int last = static_cast<int>(groups()) - 1;
   for (std::size_t lane = 0; lane < kLanes; ++lane) chosenGroup[lane] = std::min(chosen.light[lane], last);
-  sampleChosen(chosen, at, samples);
+  sampleChosen(chosen, at, points, samples);
 }
 
-void PunctualLights::sampleChosen(Chosen& chosen, const ReceiverLanes& at, LightSampleLanes& samples) const {
+void PunctualLights::sampleChosen(Chosen& chosen, const ReceiverLanes& at, const UnitSquareLanes* points,
+                                  LightSampleLanes& samples) const {
   for (std::size_t lane = 0; lane < kLanes; ++lane)
     chosen.set(lane, lights_[static_cast<std::size_t>(chosen.light[lane])]);
   sampleChosen(chosen, at.p, samples);
   boundNearLight(at, samples);
+  if (shapes_.empty()) return;
+  LUMEL_CHECK(points != nullptr);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const int shape = lights_[static_cast<std::size_t>(chosen.light[lane])].shape;
+    if (shape >= 0 && chosen.probability[lane] > 0.0f)
+      sampleShape(shapes_[static_cast<std::size_t>(shape)], lane, chosen.probability[lane], at, *points, samples);
+  }
 }
 
 std::vector<std::size_t> PunctualLights::around(const Vec3& p, float distance) const {

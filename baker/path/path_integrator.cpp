@@ -57,8 +57,9 @@ struct Path {
 class WaveTracer {
  public:
   WaveTracer(const LightTransport& transport, const Encoding& encoding, const Atlas& atlas, const PathOptions& options)
-      : transport_(transport), encoding_(encoding), atlas_(atlas), options_(options) {
-    for (PunctualChoice& choice : punctual_) choice.learnt = LearntChoice(transport.punctual.groups());
+      : transport_(transport), atTexels_(transport.atTexels()), encoding_(encoding), atlas_(atlas), options_(options) {
+    punctual_[0].learnt = LearntChoice(atTexels_.punctual.groups());
+    punctual_[1].learnt = LearntChoice(transport.punctual.groups());
   }
 
   WaveResult run(std::uint32_t pageIndex, const PageTexels& page, std::span<const std::uint32_t> texels,
@@ -83,12 +84,16 @@ class WaveTracer {
   void finishSample();
   SurfacePoint pointOf(std::size_t lane, Vec2 u) const;
   /// Tells whether there are lights to choose among by what they were seen to bring. Else all samples are one stretch.
-  bool learns() const { return punctual_[0].learnt.isUseful(); }
-  PunctualChoice* choiceAt(bool texel) { return learns() ? &punctual_[texel ? 0 : 1] : nullptr; }
+  bool learns() const { return punctual_[0].learnt.isUseful() || punctual_[1].learnt.isUseful(); }
+  PunctualChoice* choiceAt(bool texel) {
+    PunctualChoice& choice = punctual_[texel ? 0 : 1];
+    return choice.learnt.isUseful() ? &choice : nullptr;
+  }
   /// Tells whether what shines by itself does not count for a ray.
   bool leavesOut(int depth) const { return depth == 0 && options_.indirectOnly; }
 
   const LightTransport& transport_;
+  const LightTransport atTexels_;
   const Encoding& encoding_;
   const Atlas& atlas_;
   const PathOptions& options_;
@@ -145,7 +150,7 @@ void WaveTracer::startTexels(std::uint32_t pageIndex, const PageTexels& page, st
     texel.coverage = static_cast<float>(std::min(area, 1.0));
     texel.probed = texels[lane] % kProbeStride == 0;
     covered_[lane] = area > 0.0;
-    NearLights near = nearLightsOf(transport_.punctual, footprints_[lane]);
+    NearLights near = nearLightsOf(atTexels_.punctual, footprints_[lane]);
     near_[lane] = std::move(near.lights);
     perReach2_[lane] = near.perReach2;
     anyNear_ = anyNear_ || near.perReach2 > 0.0f;
@@ -247,12 +252,14 @@ void WaveTracer::lightFromNear() {
     const int l = static_cast<int>(lane);
     const std::uint32_t sample = samples_.sample(l);
     for (std::size_t k = 0; k < near_[lane].size(); ++k) {
-      const NearSample near = sampleNear(transport_, atlas_, footprints_[lane], near_[lane][k],
-                                         samplers_[lane].get2D(sample, kNear + static_cast<std::uint32_t>(k)));
+      const std::uint32_t pattern = kNear + static_cast<std::uint32_t>(k);
+      const NearSample near =
+          sampleNear(atTexels_, atlas_, footprints_[lane], near_[lane][k], samplers_[lane].get2D(sample, pattern),
+                     samplers_[lane].get2D(sample, pattern + kPunctualPoint));
       if (near.light == Vec3(0.0f)) continue;
       ShadowPacket shadow;
       shadow.clear();
-      shadow.set(l, near.receiver.rayStart, near.position - near.receiver.rayStart, 1.0f);
+      shadow.set(l, near.receiver.rayStart, near.target - near.receiver.rayStart, 1.0f);
       transport_.rays.occluded(shadow, TraceMode::Packet);
       ++result_.shadowRays;
       if (shadow.visible(l)) addLight(l, near.frame.toLocal(near.wi), near.light);
@@ -263,7 +270,7 @@ void WaveTracer::lightFromNear() {
 void WaveTracer::lightTexels() {
   lanes_.perReach2 = anyNear_ ? perReach2_.data() : nullptr;
   result_.shadowRays += directLight(
-      transport_, lanes_, samples_, 0, TraceMode::Packet, kGatherDensity,
+      atTexels_, lanes_, samples_, 0, TraceMode::Packet, kGatherDensity,
       [&](int lane, const Vec3& wi, const Vec3& light) {
         addLight(lane, paths_[static_cast<std::size_t>(lane)].frame.toLocal(wi), light);
       },

@@ -251,7 +251,31 @@ Expected<tinygltf::Model> readModel(Json root, const std::string& name) {
   return model;
 }
 
+tinygltf::Value toValue(const Json& json) {
+  if (json.is_object()) {
+    tinygltf::Value::Object object;
+    for (const auto& [key, item] : json.items()) object.emplace(key, toValue(item));
+    return tinygltf::Value(std::move(object));
+  }
+  if (json.is_array()) {
+    tinygltf::Value::Array array;
+    for (const Json& item : json) array.push_back(toValue(item));
+    return tinygltf::Value(std::move(array));
+  }
+  if (json.is_boolean()) return tinygltf::Value(json.get<bool>());
+  if (json.is_number()) return tinygltf::Value(json.get<double>());
+  if (json.is_string()) return tinygltf::Value(json.get<std::string>());
+  return {};
+}
+
 }  // namespace
+
+std::optional<tinygltf::Value> valueOfJson(const std::string& text) {
+  if (nestsTooDeep(text)) return std::nullopt;
+  const Json json = Json::parse(text, nullptr, false);
+  if (json.is_discarded()) return std::nullopt;
+  return toValue(json);
+}
 
 Expected<std::span<const std::uint8_t>> GltfDocument::viewBytes(int view) const {
   const auto index = static_cast<std::size_t>(view);

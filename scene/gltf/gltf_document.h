@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -63,6 +64,9 @@ struct GltfDocument {
 /// meshopt views. `bytes` is the whole .gltf or .glb (told apart by content).
 Expected<GltfDocument> openGltf(std::vector<std::uint8_t> bytes, const std::string& name,
                                 const std::filesystem::path& folder, const LoadOptions& options);
+
+/// Reads JSON that stands in a text; nothing where it is none, or nests too deep.
+std::optional<tinygltf::Value> valueOfJson(const std::string& text);
 
 /// The member `key` of a tinygltf extension value as a number or index, or the fallback.
 double valueNumber(const tinygltf::Value& object, const char* key, double fallback);

@@ -7,6 +7,7 @@
 
 #include "scene/gltf/gltf_accessor.h"
 #include "scene/gltf/gltf_extras.h"
+#include "scene/gltf/gltf_lights.h"
 #include "scene/gltf/gltf_skin.h"
 
 namespace lumel {
@@ -67,7 +68,7 @@ class NodeFlattener {
                    const ObjectSettings& settings);
   int addUse(MeshUse use);
   int plainUse(int mesh);
-  void addLight(std::size_t node, int light);
+  void warnOfAreaLights();
   void addCamera(std::size_t node);
 
   const GltfDocument& document_;
@@ -77,6 +78,8 @@ class NodeFlattener {
   std::vector<glm::dmat4> worldFromNode_;
   std::vector<MeshUse> uses_;
   std::map<int, int> plainUses_;  // mesh of the file -> use
+  LightScale lightScale_;
+  std::vector<std::string> areaLights_;  // names of nodes that look like them
 };
 
 /// World transforms of all nodes, parents before children; what no root leads to is in a cycle.
@@ -221,43 +224,18 @@ std::optional<Error> NodeFlattener::addMesh(std::size_t index) {
   return std::nullopt;
 }
 
-/// Sets the cone of a spot light, within what KHR_lights_punctual allows.
-template <class Warn>
-void setCone(const tinygltf::Light& source, Light& light, const Warn& warn) {
-  constexpr double kHalfPi = 1.5707964;  // pi / 2 as a float has it: what exporters write
-  const double inner = source.spot.innerConeAngle, outer = source.spot.outerConeAngle;
-  if (light.type == LightType::Spot && !(inner >= 0 && outer > 0 && inner <= outer && outer <= kHalfPi))
-    warn("its cone from " + std::to_string(inner) + " to " + std::to_string(outer) +
-         " is outside of the format (0 <= inner < outer <= pi/2); it is cut to that");
-  light.outerConeAngle = static_cast<float>(std::clamp(outer, 0.0, static_cast<double>(kPi) / 2));
-  light.innerConeAngle = static_cast<float>(std::clamp(inner, 0.0, static_cast<double>(light.outerConeAngle)));
-}
-
-void NodeFlattener::addLight(std::size_t node, int index) {
-  const auto& source = document_.model.lights[static_cast<std::size_t>(index)];
-  Light light;
-  light.name = !source.name.empty() ? source.name : nodes_[node].name;
-  light.type = source.type == "spot"          ? LightType::Spot
-               : source.type == "directional" ? LightType::Directional
-                                              : LightType::Point;
-  const auto warn = [&](const std::string& problem) {
-    scene_.report.warnings.push_back(document_.name + ": light '" + light.name + "': " + problem);
-  };
-  if (source.color.size() == 3) {
-    if (std::any_of(source.color.begin(), source.color.end(), [](double c) { return c < 0; }))
-      warn("its colour is negative and counts as 0 there");
-    for (int c = 0; c < 3; ++c)
-      light.color[c] = static_cast<float>(std::max(source.color[static_cast<std::size_t>(c)], 0.0));
-  }
-  if (source.intensity < 0) warn("its intensity is negative; it gives no light");
-  light.intensity = static_cast<float>(std::max(source.intensity, 0.0));
-  light.range = static_cast<float>(std::max(source.range, 0.0));
-  setCone(source, light, warn);
-  const glm::dmat4& world = worldFromNode_[node];
-  light.position = Vec3(glm::dvec3(world[3]));
-  const glm::dvec3 away = -glm::dvec3(world[2]);
-  if (glm::length(away) > 0) light.direction = Vec3(glm::normalize(away));
-  scene_.lights.push_back(std::move(light));
+/// Says which nodes stand where a modelling tool had area lights.
+void NodeFlattener::warnOfAreaLights() {
+  constexpr std::size_t kMostNames = 6;
+  if (areaLights_.empty()) return;
+  std::string names;
+  for (std::size_t i = 0; i < std::min(areaLights_.size(), kMostNames); ++i)
+    names += (i == 0 ? "'" : ", '") + areaLights_[i] + "'";
+  if (areaLights_.size() > kMostNames) names += " and " + std::to_string(areaLights_.size() - kMostNames) + " more";
+  scene_.report.warnings.push_back(
+      document_.name + ": empty nodes that look like area lights give no light, because glTF has none: " + names +
+      "; give them extras.lumel.light (in Blender a custom property lumel), such as {\"light\": {\"type\": "
+      "\"rectangle\", \"size\": [1, 1], \"watts\": 100}}");
 }
 
 void NodeFlattener::addCamera(std::size_t node) {
@@ -294,13 +272,14 @@ std::optional<Error> NodeFlattener::visit(std::size_t index) {
   if (node.mesh >= 0)
     if (auto error = addMesh(index)) return error;
   if (node.camera >= 0) addCamera(index);
-  if (const auto* light = findExtension(node.extensions, "KHR_lights_punctual"))
-    addLight(index, static_cast<int>(valueNumber(*light, "light", 0)));
+  if (auto error = addLight(document_, index, worldFromNode_[index], lightScale_, scene_)) return error;
+  if (looksLikeAreaLight(node)) areaLights_.push_back(node.name.empty() ? placeOf(index) : node.name);
   return std::nullopt;
 }
 
 Expected<std::vector<MeshUse>> NodeFlattener::run() {
   if (auto error = placeNodes()) return *error;
+  lightScale_ = lightScaleOf(document_, scene_.report.notes);
   std::vector<bool> visited(nodes_.size(), false);
   std::vector<std::size_t> pending;
   const auto push = [&](const std::vector<int>& list) {
@@ -315,6 +294,7 @@ Expected<std::vector<MeshUse>> NodeFlattener::run() {
     if (auto error = visit(n)) return *error;
     push(nodes_[n].children);
   }
+  warnOfAreaLights();
   return std::move(uses_);
 }
 

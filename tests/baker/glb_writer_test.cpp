@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "scene/ies/ies_file.h"
 #include "scene/images/image_io.h"
 #include "scene/load/load_scene.h"
 #include "tests/scratch.h"
@@ -275,6 +276,51 @@ TEST(GlbWriter, LightsAndCamerasSurvive) {
   EXPECT_EQ(scene.cameras[0].worldFromCamera, camera.worldFromCamera);
   EXPECT_EQ(scene.cameras[0].yFov, 1.0f);
   EXPECT_EQ(scene.cameras[0].aspect, 1.5f);
+}
+
+TEST(GlbWriter, LampsThatGltfDoesNotHaveSurvive) {
+  Fixture fixture;
+  Light panel{.name = "Panel",
+              .type = LightType::Rectangle,
+              .color = {1, 0.5f, 0.25f},
+              .intensity = 3.0f,
+              .position = {1, 2, 3},
+              .direction = {0, -1, 0},
+              .right = {0, 0, 1},
+              .up = {1, 0, 0}};
+  panel.size = {2.0f, 0.5f};
+  Light soft{.name = "Soft", .type = LightType::Point, .intensity = 20.0f};
+  soft.radius = 0.25f;
+  soft.mode = LightMode::Indirect;
+  soft.hasShadowMask = true;
+  Light sphere = soft;
+  sphere.name = "Sphere";
+  sphere.type = LightType::Sphere;
+  sphere.profile = std::make_shared<const LightProfile>(
+      *parseIes("TILT=NONE\n1 1 1 2 1 1 2 0 0 0 1 1 1\n0 90\n0\n4 2\n"));
+  Light sun{.name = "Sun", .type = LightType::Directional};
+  sun.halfAngle = 0.0046f;
+  fixture.scene.lights = {panel, soft, sphere, sun};
+  const Scene scene = fixture.roundTrip();
+  ASSERT_EQ(scene.lights.size(), 4u);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Light& a = fixture.scene.lights[i];
+    const Light& b = scene.lights[i];
+    EXPECT_EQ(b.name, a.name);
+    EXPECT_EQ(b.type, a.type);
+    EXPECT_EQ(b.color, a.color);
+    EXPECT_NEAR(b.intensity, a.intensity, 1e-5f * a.intensity);
+    EXPECT_EQ(b.mode, a.mode);
+    EXPECT_EQ(b.hasShadowMask, a.hasShadowMask);
+    EXPECT_NEAR(b.radius, a.radius, 1e-6f);
+    EXPECT_NEAR(b.halfAngle, a.halfAngle, 1e-7f);
+    EXPECT_NEAR(glm::length(b.size - a.size), 0.0f, 1e-6f);
+    EXPECT_NEAR(glm::length(b.direction - a.direction), 0.0f, 1e-6f);
+  }
+  EXPECT_NEAR(glm::length(scene.lights[0].right - panel.right), 0.0f, 1e-6f);
+  EXPECT_NEAR(glm::length(scene.lights[0].up - panel.up), 0.0f, 1e-6f);
+  ASSERT_TRUE(scene.lights[2].profile);
+  EXPECT_EQ(scene.lights[2].profile->text, sphere.profile->text);
 }
 
 TEST(GlbWriter, ContainerFollowsTheSpecification) {

@@ -236,6 +236,44 @@ TEST(Render, NormalMapDecodesTheThreeMaps) {
   EXPECT_NEAR(readPixels(dir / "still.exr").rgb(4, 4).x, expected / weights, 0.01f * expected / weights);
 }
 
+/// A floor under lamps of which `marked` have a shadow mask.
+nlohmann::json floorUnderMarkedLamps(int marked) {
+  nlohmann::json gltf = gltfOf({floorQuad()});
+  gltf["extensionsUsed"] = {"KHR_lights_punctual"};
+  gltf["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "point"}, {"intensity", 3.0}}};
+  for (int i = 0; i < marked; ++i) {
+    gltf["scenes"][0]["nodes"].push_back(gltf["nodes"].size());
+    gltf["nodes"].push_back({{"name", "Lamp " + std::to_string(i)},
+                             {"translation", {0.1 * i, i == 1 ? -1.0 : 1.0, 0.0}},
+                             {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}},
+                             {"extras", {{"lumel", {{"light", {{"shadow_mask", true}}}}}}}});
+  }
+  return gltf;
+}
+
+// Two lamps, of which one is below the floor: R is open, G is shadow, and bake.json names them.
+TEST(Bake, ShadowMasksOfUpToFourLamps) {
+  const auto dir = scratch();
+  const auto bake = [&](int marked) {
+    writeFile(dir / "floor.gltf", floorUnderMarkedLamps(marked).dump());
+    return run({"bake", dir / "floor.gltf", "-o", dir / "out", "--uv", "scene", "--page-size", "16", "--samples", "16",
+                "--shadow-masks"});
+  };
+  const Outcome two = bake(2);
+  ASSERT_EQ(two.exitCode, 0) << two.err;
+  const Image mask = readPixels(dir / "out" / "lightmap-0-masks.exr");
+  ASSERT_EQ(mask.channels, 4);
+  EXPECT_EQ(mask.at(8, 8)[0], 1.0f);
+  EXPECT_EQ(mask.at(8, 8)[1], 0.0f);
+  const nlohmann::json masks = readJson(dir / "out" / "bake.json")["shadowMasks"];
+  EXPECT_EQ(masks["files"], nlohmann::json({"lightmap-0-masks.exr"}));
+  EXPECT_EQ(masks["lamps"][1]["channel"], "G");
+  EXPECT_EQ(masks["lamps"][1]["name"], "Lamp 1");
+  const Outcome five = bake(5);
+  EXPECT_EQ(five.exitCode, 3);
+  EXPECT_NE(five.err.find("'Lamp 4' is number 5 of 5 with a shadow mask"), std::string::npos) << five.err;
+}
+
 TEST(Bake, ErrorOfTooFewSamplesIsNotZero) {
   const auto dir = scratch();
   writeFile(dir / "floor.gltf", gltfOf({floorQuad()}).dump());

@@ -173,9 +173,9 @@ TEST(GltfNodes, ObjectSettingsFromMeshAndNodeExtras) {
     return result ? std::string() : result.error().message;
   };
   EXPECT_EQ(message({{"scale", 0}}), "test.glb: nodes/0/extras/lumel: scale must be a number above 0");
-  EXPECT_EQ(message({{"casts", 1}}), "test.glb: nodes/0/extras/lumel: casts must be true or false");
+  EXPECT_EQ(message({{"casts", 2}}), "test.glb: nodes/0/extras/lumel: casts must be true or false");
   EXPECT_EQ(message({{"scales", 1}}),
-            "test.glb: nodes/0/extras/lumel: 'scales' is not known; use scale, casts or receives");
+            "test.glb: nodes/0/extras/lumel: 'scales' is not known; use scale, casts, receives or light");
 }
 
 TEST(GltfNodes, DeepTreesDoNotOverflowTheStack) {

@@ -10,6 +10,7 @@ namespace {
 
 constexpr const char* kFlat = "flat";
 constexpr const char* kAux = "aux";
+constexpr const char* kMasks = "masks";
 
 bool isPageImage(const std::string& name) {
   constexpr std::string_view prefix = "lightmap-";
@@ -18,7 +19,8 @@ bool isPageImage(const std::string& name) {
   if (dash == std::string::npos || dash == prefix.size()) return false;
   const std::string rest = name.substr(dash);
   const auto isRest = [&rest](const std::string& kind) { return rest == "-" + kind + ".exr"; };
-  return isRest(kFlat) || isRest(kAux) || std::any_of(knownMapNames().begin(), knownMapNames().end(), isRest);
+  return isRest(kFlat) || isRest(kAux) || isRest(kMasks) ||
+         std::any_of(knownMapNames().begin(), knownMapNames().end(), isRest);
 }
 
 }  // namespace

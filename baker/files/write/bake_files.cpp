@@ -30,14 +30,17 @@ std::map<std::string, std::string> pageMetadata(std::size_t page, const std::str
   metadata["lumel:bounces"] = describeBounces(record.bakeOptions.bounces);
   metadata["lumel:seed"] = std::to_string(record.bakeOptions.seed);
   metadata["lumel:dilate"] = std::to_string(record.dilate);
-  if (kind == "aux") {
+  if (kind == "masks")
+    metadata["lumel:units"] =
+        "share of a lamp's irradiance that arrives, 0..1; lamps by channel: shadowMasks in bake.json";
+  if (kind == "aux")
     metadata["lumel:units"] =
         "coverage: area share 0..1; validity: share of gather rays that met no back face; stderr, stderr0 and so on: "
         "standard error of the luminance of the flat map and of the maps in their order, as they are in these files, "
         "NaN where it is not known; samples: gather rays";
+  if (kind == "aux" || kind == "masks")
     for (const char* key : {"decode", "decodeFormula", "basis", "order", "encoding"})
       metadata.erase(std::string("lumel:") + key);
-  }
   return metadata;
 }
 
@@ -60,7 +63,7 @@ Image joined(const Image& first, const Image& second) {
   return image;
 }
 
-Expected<void> addPage(FileSet& set, const fs::path& dir, std::size_t page, const BakedPage& baked,
+Expected<void> addPage(FileSet& set, const fs::path& dir, std::size_t page, const BakedPage& baked, const Image* masks,
                        const BakeRecord& record, std::vector<ImageFile>& files) {
   WriteImageOptions options;
   options.format = record.half ? PixelFormat::Half : PixelFormat::Float;
@@ -76,6 +79,8 @@ Expected<void> addPage(FileSet& set, const fs::path& dir, std::size_t page, cons
   const std::vector<std::string> kinds = lightKinds(mapNames);
   for (std::size_t i = 0; i < kinds.size(); ++i)
     if (auto added = add(kinds[i], i < mapNames.size() ? baked.maps[i] : baked.flat); !added) return added;
+  if (masks != nullptr)
+    if (auto added = add("masks", *masks); !added) return added;
   // Sample counts and coverage are exact in float only.
   options.format = PixelFormat::Float;
   options.noisy = false;
@@ -106,7 +111,10 @@ Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasRes
   if (!set) return set.error();
   std::vector<ImageFile> files;
   for (std::size_t page = 0; page < result.pages.size(); ++page)
-    if (auto added = addPage(*set, dir, page, result.pages[page], record, files); !added) return added;
+    if (auto added = addPage(*set, dir, page, result.pages[page],
+                             page < result.shadowMasks.size() ? &result.shadowMasks[page] : nullptr, record, files);
+        !added)
+      return added;
   if (!scene.environment.isBlack() && !scene.environment.image.empty()) {
     auto sky = set->add(dir / "sky.exr");
     if (!sky) return sky.error();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "baker/bake/shadow_masks.h"
 #include "baker/files/names/bake_format.h"
 #include "baker/files/names/conventions.h"
 #include "baker/files/names/file_names.h"
@@ -140,6 +141,26 @@ Json describeSky(const Environment& sky) {
   return json;
 }
 
+/// The lamps, as scene.glb has them, for readers that light with them.
+Json describeLights(const Scene& scene) {
+  Json rows = Json::array();
+  for (const Light& light : scene.lights)
+    rows.push_back({{"name", light.name}, {"type", nameOf(light.type)}, {"mode", nameOf(light.mode)}});
+  return rows;
+}
+
+/// Which lamp each channel of the shadow masks is of; null without these.
+Json describeShadowMasks(const Scene& scene, const BakeResult& result) {
+  if (result.shadowMasks.empty()) return nullptr;
+  constexpr const char* kChannels[] = {"R", "G", "B", "A"};
+  Json rows = Json::array();
+  for (const std::size_t light : lightsWithMask(scene.lights))
+    rows.push_back({{"channel", kChannels[rows.size()]}, {"light", light}, {"name", scene.lights[light].name}});
+  Json files = Json::array();
+  for (std::size_t page = 0; page < result.shadowMasks.size(); ++page) files.push_back(pageFileName(page, "masks"));
+  return {{"lamps", std::move(rows)}, {"files", std::move(files)}};
+}
+
 Json describeEncoding(const Encoding& encoding) {
   return {{"name", encoding.name()},
           {"maps", encoding.mapNames()},
@@ -152,6 +173,7 @@ Json describeScene(const Scene& scene, const BakeRecord& record) {
           {"instances", scene.instances.size()},
           {"materials", scene.materials.size()},
           {"lights", scene.lights.size()},
+          {"notes", scene.report.notes},
           {"degenerateTriangles", scene.report.degenerateTriangles},
           {"skippedPrimitives", scene.report.skippedPrimitives}};
 }
@@ -247,6 +269,8 @@ std::string describeBake(const Scene& scene, const AtlasResult& atlas, const Bak
   json["conventions"] = describeConventions(encoding);
   json["conventions"]["aux"] = describeAuxChannels(encoding);
   json["sky"] = describeSky(scene.environment);
+  json["lights"] = describeLights(scene);
+  json["shadowMasks"] = describeShadowMasks(scene, result);
   json["atlas"] = {{"texelsPerMeter", atlas.atlas.texelsPerMeter},
                    {"charts", atlas.atlas.charts.size()},
                    {"generatedCharts", atlas.report.generatedCharts},

@@ -18,6 +18,18 @@ using Json = nlohmann::ordered_json;
 
 std::size_t toSize(int i) { return static_cast<std::size_t>(i); }
 
+std::string base64(const std::string& bytes) {
+  constexpr const char* kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      group = group << 8 | (i + k < bytes.size() ? static_cast<std::uint8_t>(bytes[i + k]) : 0u);
+    for (std::size_t k = 0; k < 4; ++k) text += i + k > bytes.size() ? '=' : kDigits[group >> (18 - 6 * k) & 63u];
+  }
+  return text;
+}
+
 std::set<int> uvSetsOf(const Material& m) {
   std::set<int> sets;
   for (const TextureRef* ref : {&m.baseColorMap, &m.metallicRoughnessMap, &m.normalMap, &m.emissionMap})
@@ -152,8 +164,41 @@ class GlbWriter {
       attributes["TEXCOORD_" + std::to_string(set)] = accessors[set] >= 0 ? accessors[set] : *any;
   }
 
+  /// What KHR_lights_punctual does not hold of a lamp; null: nothing.
+  static Json lightSettings(const Light& light) {
+    Json json;
+    if (!isPunctual(light.type)) {
+      json["type"] = nameOf(light.type);
+      json[unitOf(light.type)] = light.intensity;
+      json["color"] = {light.color.x, light.color.y, light.color.z};
+    }
+    if (light.type == LightType::Rectangle) json["size"] = {light.size.x, light.size.y};
+    if (light.radius > 0.0f || light.type == LightType::Sphere) json["radius"] = light.radius;
+    if (light.halfAngle > 0.0f) json["angle"] = light.halfAngle * 360.0f * kInvPi;
+    if (light.profile) json["ies"] = "data:application/octet-stream;base64," + base64(light.profile->text);
+    if (light.mode != LightMode::All) json["mode"] = nameOf(light.mode);
+    if (light.hasShadowMask) json["shadow_mask"] = true;
+    return json;
+  }
+
+  /// A lamp of a kind that glTF does not have: a node with settings alone.
+  void addOwnLight(const Light& light, Json settings) {
+    Json node = {{"extras", {{"lumel", {{"light", std::move(settings)}}}}}};
+    if (!light.name.empty()) node["name"] = light.name;
+    node["matrix"] = toJson(frameOf(light));
+    addNode(std::move(node));
+  }
+  static Mat4 frameOf(const Light& light) {
+    return Mat4(Vec4(light.right, 0), Vec4(light.up, 0), Vec4(-light.direction, 0), Vec4(light.position, 1));
+  }
+
   void addLights() {
     for (const Light& light : scene_.lights) {
+      Json settings = lightSettings(light);
+      if (!isPunctual(light.type)) {
+        addOwnLight(light, std::move(settings));
+        continue;
+      }
       Json json = {{"type", nameOf(light.type)},
                    {"color", {light.color.x, light.color.y, light.color.z}},
                    {"intensity", light.intensity}};
@@ -166,6 +211,8 @@ class GlbWriter {
       // A light shines along its node's -z.
       const Frame frame = frameAround(-light.direction);
       node["matrix"] = toJson(Mat4(Vec4(frame.t, 0), Vec4(frame.b, 0), Vec4(frame.n, 0), Vec4(light.position, 1)));
+      if (light.profile) node["matrix"] = toJson(frameOf(light));
+      if (!settings.is_null()) node["extras"]["lumel"]["light"] = std::move(settings);
       lights_.push_back(std::move(json));
       addNode(std::move(node));
     }

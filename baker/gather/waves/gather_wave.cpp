@@ -20,7 +20,10 @@ void GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const 
   for (std::size_t lane = 0; lane < wave_.count; ++lane)
     if ((wave_.first + lane) % kProbeStride == 0) sink.probedLane = lane;
   const auto seenToArrive = [&] {
-    return punctualChoice(wave_.scene.transport.punctual, wave_.scene.strategies, spreads);
+    const LightTransport& transport = wave_.scene.transport;
+    // Where texels take light from other lamps than hits do, they teach nothing.
+    const bool teaches = transport.straight == nullptr;
+    return punctualChoice(transport.punctual, wave_.scene.strategies, teaches ? spreads : std::span<LightSpread>());
   };
   GatherTracer tracer(wave_.scene.transport, wave_.scene.map, wave_.scene.reflectance, wave_.scene.lastDepth,
                       seenToArrive(), sink);
@@ -89,6 +92,7 @@ static void tallyLight(const SampledLight& sampled, const Vec3Lanes& dirTangent,
 void GatherWave::sampleStrategy(std::size_t strategy, std::uint32_t first, std::uint32_t end, float weight, bool pilot,
                                 GatherSink& sink) {
   SampledLight sampled;
+  const LightTransport transport = wave_.scene.transport.atTexels();
   // While one sample's shadow rays are traced, memory brings the cells of the sky for the next.
   std::array<EnvironmentLight::Places, 2> sky;
   const bool isSky = wave_.scene.strategies[strategy].kind == LightStrategy::Sky;
@@ -101,9 +105,8 @@ void GatherWave::sampleStrategy(std::size_t strategy, std::uint32_t first, std::
     const PointLanes points = wave_.points[s];
     if (isSky && s + 1 < end) findSky(s + 1);
     wave_.lightSamples.setSampleOfAll(s);
-    const std::uint64_t rays =
-        takeLight(wave_.scene.transport, wave_.scene.strategies[strategy], near_.receivers(points), wave_.lightSamples,
-                  0, kGatherDensity, sampled, isSky ? &sky[s % 2] : nullptr);
+    const std::uint64_t rays = takeLight(transport, wave_.scene.strategies[strategy], near_.receivers(points),
+                                         wave_.lightSamples, 0, kGatherDensity, sampled, isSky ? &sky[s % 2] : nullptr);
     if (rays == 0) continue;
     sink.result.shadowRays += rays;
     sampled.trace(wave_.scene.transport.rays, TraceMode::Packet);

@@ -5,7 +5,7 @@
 namespace lumel {
 
 NearTexels::NearTexels(const WaveTexels& wave) {
-  const PunctualLights& lights = wave.scene.transport.punctual;
+  const PunctualLights& lights = wave.scene.transport.atTexels().punctual;
   if (wave.scene.indirectOnly || lights.size() == lights.directional()) return;
   for (std::size_t lane = 0; lane < wave.count; ++lane) {
     if (!wave.covered[lane]) continue;
@@ -39,12 +39,15 @@ void NearTexels::gather(const WaveTexels& wave, const NetRange& net, GatherSink&
 void NearTexels::addSample(const WaveTexels& wave, const Texel& texel, std::size_t light, std::uint32_t sample,
                            GatherSink& sink) {
   const Vec2 u = wave.samplers[texel.lane].get2D(sample, kNearLight + static_cast<std::uint32_t>(light));
-  const NearSample near = sampleNear(wave.scene.transport, wave.scene.atlas, texel.footprint, texel.lights[light], u);
+  const Vec2 onLight =
+      wave.samplers[texel.lane].get2D(sample, kNearLight + kPunctualPoint + static_cast<std::uint32_t>(light));
+  const NearSample near =
+      sampleNear(wave.scene.transport.atTexels(), wave.scene.atlas, texel.footprint, texel.lights[light], u, onLight);
   if (near.light == Vec3(0.0f)) return;
   const int lane = static_cast<int>(texel.lane);
   ShadowPacket shadow;
   shadow.clear();
-  shadow.set(lane, near.receiver.rayStart, near.position - near.receiver.rayStart, 1.0f);
+  shadow.set(lane, near.receiver.rayStart, near.target - near.receiver.rayStart, 1.0f);
   wave.scene.transport.rays.occluded(shadow, TraceMode::Packet);
   ++sink.result.shadowRays;
   if (!shadow.visible(lane)) return;

@@ -104,12 +104,13 @@ Vec3 WarmWave::meanReflectance(const WarmAlbedos& albedos) const {
 }
 
 void WarmWave::warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts) {
-  PunctualChoice punctual = punctualChoice(wave_.scene.transport.punctual, {}, {});
+  const LightTransport transport = wave_.scene.transport.atTexels();
+  PunctualChoice punctual = punctualChoice(transport.punctual, {}, {});
   for (std::uint32_t s = 0; s < kWarmLights; ++s) {
     const ReceiverLanes receivers = wave_.points[s].receivers();
     wave_.lightSamples.setSampleOfAll(s);
     counts.shadowRays += directLight(
-        wave_.scene.transport, receivers, wave_.lightSamples, 0, TraceMode::Packet, kGatherDensity,
+        transport, receivers, wave_.lightSamples, 0, TraceMode::Packet, kGatherDensity,
         [&](int lane, const Vec3& wi, const Vec3& light) {
           const auto l = static_cast<std::size_t>(lane);
           const Vec3 flat = light * (glm::dot(wi, receivers.ns[l]) * kInvPi);
