@@ -32,8 +32,8 @@ struct Primitive {
   std::string name;  // for messages: "mesh 'Wall' primitive 2"
   std::vector<Vec3> positions;
   std::vector<Vec3> normals;              // unit; always present after loading (flat where the file had none)
-  std::vector<Vec4> tangents;             // xyz unit, w = +-1: bitangent = w * cross(n, t); from the file or made
-                                          // from the normal map's UVs; empty where neither asks for them
+  std::vector<Vec4> tangents;             // xyz unit, w = +-1: bitangent = w * cross(n, t); from the file or made from
+                                          // the normal or ssbump map's UVs; empty where neither asks for them
   std::vector<std::vector<Vec2>> uvSets;  // TEXCOORD_n; v runs down the image
   std::vector<Vec4> colors;               // COLOR_0, linear, alpha 1 where the file has RGB
   std::vector<std::uint32_t> indices;     // three per triangle, counter-clockwise from the front
@@ -98,6 +98,11 @@ struct Material {
   TextureRef metallicRoughnessMap;
   TextureRef normalMap;  // tangent space, green up
   float normalScale = 1.0f;
+  TextureRef occlusionMap;  // red channel: share of the even light around that reaches a point
+  float occlusionStrength = 1.0f;
+  TextureRef ssbumpMap;    // self-shadowed bump map (extras.lumel.ssbump), whose channels are as these say:
+  std::string ssbumpForm;  // "squared", "linear" or "mod2x"; empty: not stated
+  std::string ssbumpHand;  // "right" or "left"; empty: not stated
   Vec3 emission{0, 0, 0};  // nits: emissiveFactor * emissiveStrength
   TextureRef emissionMap;  // sRGB, times `emission`
   AlphaMode alphaMode = AlphaMode::Opaque;

@@ -119,6 +119,7 @@ void declareOptions(OptionTable& options, BakeArguments& a) {
   options.integer("dilate", a.dilate, {0, 1024}, "Rings of texels grown around charts; 0: none").defaultText =
       "half of --padding";
   declareOutsidePaths(options, a);
+  declareSsbump(options, a);
   declareAtlasOptions(options, a.atlas);
   options
       .path("layout-from", a.layoutFrom,

@@ -163,6 +163,7 @@ Command infoCommand() {
       .placeholder = "DIR";
   declareSky(command.options, a);
   declareOutsidePaths(command.options, a);
+  declareSsbump(command.options, a);
   command.run = [arguments](CommandContext& context) -> Expected<void> {
     if (auto checked = check(*arguments, context.options); !checked) return checked;
     const auto json = describe(*arguments);

@@ -9,6 +9,8 @@
 #include "baker/files/names/file_names.h"
 #include "baker/files/names/version.h"
 #include "baker/stills/compositor.h"
+#include "baker/stills/lamps.h"
+#include "baker/stills/sheet.h"
 #include "baker/stills/tone_map.h"
 #include "baker/stills/viewpoint.h"
 #include "scene/base/parallel.h"
@@ -34,7 +36,8 @@ struct RenderArguments {
   int width = 0;
   int height = 0;
   int samplesPerPixel = 16;
-  std::size_t mode = 0;  // of shadings()
+  std::string modes = std::string(shadings().front().name);  // separated by commas
+  std::string lamps;
   std::optional<float> exposure;
   ToneMap toneMap = ToneMap::Aces;
   int threads = 0;
@@ -49,7 +52,18 @@ void declareOptions(OptionTable& options, RenderArguments& a) {
   options.integer("width", a.width, {0, 16384}, "Pixels").defaultText = std::to_string(kDefaultWidth);
   options.integer("height", a.height, {0, 16384}, "Pixels").defaultText = "by the camera's aspect, else 16:9";
   options.integer("spp", a.samplesPerPixel, {1, 4096}, "Rays per pixel, for smooth edges");
-  options.choice("mode", a.mode, shadingNames(), "What to show: " + describeShadings());
+  options
+      .text(
+          "mode", a.modes,
+          "What to show; several, separated by commas, make a sheet of panels with their names. " + describeShadings())
+      .placeholder = "NAME,...";
+  options
+      .text("light", a.lamps,
+            "Lights that are not in the bake, with shadows, separated by semicolons: point:X,Y,Z:CANDELA, "
+            "spot:X,Y,Z:DX,DY,DZ:CANDELA:DEGREES, spot:camera:CANDELA:DEGREES (a flashlight), sun:DX,DY,DZ:LUX; each "
+            "may end in :R,G,B")
+      .placeholder = "LIGHT;...";
+  options.find("light")->defaultText = "none";
   options
       .optionalNumber("exposure", a.exposure, {-64.0f, 64.0f}, "Stops of exposure for PNG; 0 shows radiance 1 as white")
       .defaultText = "by the picture's brightness";
@@ -66,10 +80,32 @@ void declareOptions(OptionTable& options, RenderArguments& a) {
   options.integer("threads", a.threads, {0, 1024}, "Threads to use, without influence on the result; 0: one per core");
 }
 
+Expected<std::vector<const Shading*>> modesOf(const RenderArguments& a) {
+  std::vector<const Shading*> modes;
+  for (std::size_t at = 0; at <= a.modes.size();) {
+    const std::size_t end = std::min(a.modes.find(',', at), a.modes.size());
+    const std::string name = a.modes.substr(at, end - at);
+    modes.push_back(findShading(name));
+    if (!modes.back()) {
+      std::string known;
+      for (const Shading& shading : shadings()) known += (known.empty() ? "" : ", ") + std::string(shading.name);
+      return usageError("--mode: '" + name + "' is not one of " + known);
+    }
+    at = end + 1;
+  }
+  return modes;
+}
+
 Expected<void> check(const RenderArguments& a) {
   const std::string extension = lowerCaseExtension(a.output);
   if (extension != ".png" && extension != ".exr")
     return usageError("--output: " + a.output.string() + ": pictures are .png or .exr");
+  const auto modes = modesOf(a);
+  if (!modes) return modes.error();
+  if (extension == ".exr" && modes->size() > 1)
+    return usageError("--mode: several modes make a sheet, which is a .png; give one for .exr");
+  if (extension == ".exr" && a.exposure)
+    return usageError("--exposure: .exr pictures are linear and unexposed; give .png");
   if (a.lookAt && !a.position) return usageError("--look-at needs --camera-position");
   if (a.position && a.lookAt && *a.position == *a.lookAt)
     return usageError("--look-at: the same point as --camera-position; it has no direction");
@@ -116,7 +152,6 @@ RenderOptions resolve(const RenderArguments& a, const Camera& camera) {
   const float aspect = camera.aspect > 0.0f ? camera.aspect : static_cast<float>(kDefaultWidth) / kDefaultHeight;
   const auto pixels = [](float v) { return std::clamp(static_cast<int>(std::lround(v)), 1, 16384); };
   RenderOptions options;
-  options.shading = &shadings()[a.mode];
   options.samplesPerPixel = a.samplesPerPixel;
   options.width = a.width > 0 ? a.width : a.height > 0 ? pixels(static_cast<float>(a.height) * aspect) : kDefaultWidth;
   options.height = a.height > 0 ? a.height : pixels(static_cast<float>(options.width) / aspect);
@@ -133,30 +168,63 @@ std::string describe(const Camera& camera) {
   return text;
 }
 
-Expected<void> writeStill(const RenderArguments& a, const Still& still, const std::string& camera, float exposure) {
-  WriteImageOptions options;
-  options.metadata = {{"lumel:version", kVersion}, {"lumel:camera", camera}};
-  if (lowerCaseExtension(a.output) == ".exr") {
-    options.metadata["lumel:units"] = "linear Rec. 709 radiance in nits, unexposed";
-    return writeImage(a.output, still.radiance, options);
-  }
-  options.format = PixelFormat::U8;
-  const Shown shown = shadings()[a.mode].shown;
-  if (shown == Shown::Data) return writeImage(a.output, still.radiance, options);
-  const ToneMap curve = shown == Shown::Light ? a.toneMap : ToneMap::Linear;
-  return writeImage(a.output, toneMap(still.radiance, exposure, curve), options);
+/// The unit that a legend names.
+std::string unitOf(const Shading& shading) {
+  if (shading.name == "density") return "texels per m";
+  if (shading.name == "error") return "%";
+  if (shading.name == "samples") return "rays";
+  return "";
 }
 
-Expected<void> runRender(const RenderArguments& a, CommandContext& context) {
-  if (auto checked = check(a); !checked) return checked;
+/// The still as an 8-bit picture shows it, sRGB-encoded.
+Image pictureOf(const Still& still, const Shading& shading, float exposure, ToneMap curve) {
+  switch (shading.shown) {
+    case Shown::Light:
+      return toneMap(still.radiance, exposure, curve);
+    case Shown::Color:
+      return toneMap(still.radiance, 0.0f, ToneMap::Linear);
+    case Shown::Number:
+      return numberPicture(still, unitOf(shading));
+    case Shown::Data:
+      break;
+  }
+  return still.radiance;
+}
+
+Expected<void> writePicture(const RenderArguments& a, const Image& picture, const std::string& camera) {
+  WriteImageOptions options;
+  options.metadata = {{"lumel:version", kVersion}, {"lumel:camera", camera}};
+  if (lowerCaseExtension(a.output) == ".exr")
+    options.metadata["lumel:units"] = "linear Rec. 709 radiance in nits, unexposed";
+  else
+    options.format = PixelFormat::U8;
+  return writeImage(a.output, picture, options);
+}
+
+void printResult(const RenderArguments& a, const Image& picture, const std::string& camera,
+                 std::optional<float> exposure) {
+  std::fprintf(stderr, "%s: %d x %d, camera %s", a.output.c_str(), picture.width, picture.height, camera.c_str());
+  if (lowerCaseExtension(a.output) == ".exr")
+    std::fputs(", unexposed\n", stderr);
+  else
+    std::fprintf(stderr, ", exposure %.2f EV\n", static_cast<double>(exposure.value_or(0.0f)));
+}
+
+Expected<void> checkOutput(const RenderArguments& a) {
   if (isBakeFile(a.output.filename().string()))
     if (auto apart = checkNoInput(a.output, std::array{a.bake / a.output.filename()}); !apart) return apart;
   const fs::path folder = a.output.has_parent_path() ? a.output.parent_path() : fs::path(".");
   std::error_code ec;
   fs::create_directories(folder, ec);
-  if (auto writable = checkWritable(folder); !writable) return writable;
+  return checkWritable(folder);
+}
+
+Expected<void> runRender(const RenderArguments& a, CommandContext& context) {
+  if (auto checked = check(a); !checked) return checked;
+  if (auto checked = checkOutput(a); !checked) return checked;
   const ThreadLimit limit(a.threads);
-  const auto baked = readBake(a.bake);
+  const std::vector<const Shading*> modes = *modesOf(a);
+  const auto baked = readBake(a.bake, {.flat = true, .aux = true});
   if (!baked) return baked.error();
   const auto compositor = Compositor::make(*baked);
   if (!compositor) return compositor.error();
@@ -167,20 +235,27 @@ Expected<void> runRender(const RenderArguments& a, CommandContext& context) {
 
   const auto camera = chooseCamera(a, *baked, *compositor);
   if (!camera) return camera.error();
-  const RenderOptions options = resolve(a, *camera);
-  const auto still = compositor->render(*camera, options, context.progress);
-  if (!still) return still.error();
-
-  const bool isLight = options.shading->shown == Shown::Light;
-  const float exposure = a.exposure ? *a.exposure : isLight ? autoExposure(still->radiance, still->lit) : 0.0f;
-  if (auto written = writeStill(a, *still, describe(*camera), exposure); !written) return written;
-  if (context.quiet) return {};
-  std::fprintf(stderr, "%s: %d x %d, camera %s", a.output.c_str(), options.width, options.height,
-               describe(*camera).c_str());
-  if (lowerCaseExtension(a.output) == ".exr")
-    std::fputs(", unexposed\n", stderr);
-  else
-    std::fprintf(stderr, ", exposure %.2f EV\n", static_cast<double>(exposure));
+  auto lamps = parseLamps(a.lamps, *camera);
+  if (!lamps) return lamps.error();
+  RenderOptions options = resolve(a, *camera);
+  options.lamps = *std::move(lamps);
+  // All panels of a sheet share one exposure, that of the first that shows light, so that they can be compared.
+  std::optional<float> exposure = a.exposure;
+  std::vector<Panel> panels;
+  for (const Shading* mode : modes) {
+    options.shading = mode;
+    const auto still = compositor->render(*camera, options, context.progress);
+    if (!still) return still.error();
+    if (lowerCaseExtension(a.output) == ".exr") {
+      panels.push_back({"", still->radiance});
+      break;
+    }
+    if (!exposure && mode->shown == Shown::Light) exposure = autoExposure(still->radiance, still->lit);
+    panels.push_back({std::string(mode->name), pictureOf(*still, *mode, exposure.value_or(0.0f), a.toneMap)});
+  }
+  const Image picture = panels.size() == 1 ? std::move(panels.front().picture) : sheetOf(panels);
+  if (auto written = writePicture(a, picture, describe(*camera)); !written) return written;
+  if (!context.quiet) printResult(a, picture, describe(*camera), exposure);
   return {};
 }
 
@@ -198,6 +273,8 @@ Command renderCommand() {
       "      the scene's first camera, or a viewpoint found by looking around\n"
       "  lumel render out/level -o light.png --mode lightmap\n"
       "      the light alone, where leaks and seams show best\n"
+      "  lumel render out/level -o sheet.png --mode albedo,flat,normal-mapped,ssbump --light spot:camera:300:25\n"
+      "      four panels with their names, under a flashlight at the eye\n"
       "  lumel render out/level -o still.exr --camera-position 0 1.7 4 --look-at 0 1 0 --width 1920";
   declareOptions(command.options, *arguments);
   command.run = [arguments](CommandContext& context) { return runRender(*arguments, context); };

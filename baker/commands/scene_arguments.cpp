@@ -5,8 +5,10 @@
 
 #include "baker/bake/lit_sides.h"
 #include "scene/images/environment.h"
+#include "scene/images/image_io.h"
 #include "scene/load/load_scene.h"
 #include "scene/triangles/sky_dome.h"
+#include "ssbump/maps/convert.h"
 
 namespace lumel {
 
@@ -16,6 +18,46 @@ void declareScene(OptionTable& options, SceneArguments& a) {
 
 void declareOutsidePaths(OptionTable& options, SceneArguments& a) {
   options.flag("allow-outside-paths", a.allowOutsidePaths, "Let the scene name files outside its own folder");
+}
+
+void declareSsbump(OptionTable& options, SceneArguments& a) {
+  options
+      .text("ssbump", a.ssbump,
+            "ssbump maps of materials, by their names, separated by commas; they go before those that the scene names "
+            "itself (extras.lumel.ssbump)")
+      .placeholder = "MATERIAL=FILE,...";
+  options.find("ssbump")->defaultText = "none";
+}
+
+/// Errors: Usage.
+static Expected<LoadOptions> loadOptionsOf(const SceneArguments& a) {
+  LoadOptions options{.allowOutsidePaths = a.allowOutsidePaths, .lightUnits = a.lightUnits};
+  for (std::size_t at = 0; at < a.ssbump.size();) {
+    const std::size_t end = std::min(a.ssbump.find(',', at), a.ssbump.size());
+    const std::string pair = a.ssbump.substr(at, end - at);
+    const std::size_t equals = pair.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == pair.size())
+      return usageError("--ssbump: '" + pair + "' is not of the form MATERIAL=FILE");
+    options.ssbump.emplace_back(pair.substr(0, equals), pair.substr(equals + 1));
+    at = end + 1;
+  }
+  return options;
+}
+
+/// What the channels of the scene's ssbump maps hold: what a file's own metadata say wins. Errors: Input.
+static Expected<void> settleSsbumpForms(Scene& scene) {
+  for (Material& material : scene.materials) {
+    if (!material.ssbumpMap) continue;
+    const ImageSource& source = scene.images[static_cast<std::size_t>(material.ssbumpMap.image)];
+    const auto loaded = readImage(source.encoded, source.name);
+    if (!loaded) return loaded.error();
+    auto encoding = ssbump::materialEncoding(*loaded, material.ssbumpForm, material.ssbumpHand);
+    if (!encoding)
+      return inputError("material '" + material.name + "': " + source.name + ": " + encoding.error().message);
+    material.ssbumpForm = ssbump::nameOf(encoding->convention);
+    material.ssbumpHand = ssbump::nameOf(encoding->hand);
+  }
+  return {};
 }
 
 void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas) {
@@ -90,8 +132,11 @@ static void treatSkyDomes(Scene& scene, SkyDome treatment) {
 }
 
 Expected<Scene> loadSceneUnderSky(const SceneArguments& a) {
-  auto scene = loadScene(a.scene, {.allowOutsidePaths = a.allowOutsidePaths, .lightUnits = a.lightUnits});
+  const auto options = loadOptionsOf(a);
+  if (!options) return options.error();
+  auto scene = loadScene(a.scene, *options);
   if (!scene) return scene;
+  if (auto settled = settleSsbumpForms(*scene); !settled) return settled.error();
   if (!a.sky.empty()) {
     auto sky = loadEnvironment(a.sky);
     if (!sky) return sky.error();

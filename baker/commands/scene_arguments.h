@@ -29,6 +29,7 @@ enum class SkyDome {
 struct SceneArguments {
   std::filesystem::path scene;
   bool allowOutsidePaths = false;
+  std::string ssbump;  // "MATERIAL=FILE,MATERIAL=FILE"
   DoubleSided doubleSided = DoubleSided::Lit;
   SkyDome skyDome = SkyDome::Keep;
   LightUnits lightUnits = LightUnits::Auto;
@@ -40,6 +41,7 @@ struct SceneArguments {
 
 void declareScene(OptionTable& options, SceneArguments& a);
 void declareOutsidePaths(OptionTable& options, SceneArguments& a);
+void declareSsbump(OptionTable& options, SceneArguments& a);
 void declareAtlasOptions(OptionTable& options, AtlasOptions& atlas);
 void declareSky(OptionTable& options, SceneArguments& a);
 void declareSkyAndSides(OptionTable& options, SceneArguments& a);

@@ -28,6 +28,7 @@ void declareOptions(OptionTable& options, StudyArguments& a) {
   output.placeholder = "DIR";
   output.required = true;
   declareOutsidePaths(options, a);
+  declareSsbump(options, a);
   options.group("Study");
   options.number("time-budget", a.timeBudget, {0.0f},
                  "Seconds for the whole: half go to the reference; bakes that would end later are left out and named. "

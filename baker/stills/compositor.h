@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "baker/files/read/baked_scene.h"
+#include "baker/stills/picture_scene.h"
 #include "baker/stills/shading.h"
 #include "scene/base/expected.h"
 #include "scene/base/progress.h"
@@ -18,11 +18,13 @@ struct RenderOptions {
   int height = 720;
   int samplesPerPixel = 16;
   const Shading* shading = &shadings().front();
+  std::vector<Light> lamps = {};  // shine beside what is baked, and cast shadows
 };
 
 struct Still {
-  Image radiance;  // linear RGB
-  Image lit;       // one channel: share of the pixel that shows a lit surface; the rest is sky or shines by itself
+  Image radiance;  // linear RGB; of numbers, their mean over what `lit` counts
+  Image lit;       // one channel: share of the pixel that shows a lit surface; the rest is sky or shines by itself. Of
+                   // numbers: the share in which they are known
 };
 
 /// What one ray sees, for choosing a viewpoint.
@@ -59,9 +61,8 @@ class Compositor {
   Vec3 boundsMax() const;
 
  private:
-  struct Impl;
-  explicit Compositor(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
+  explicit Compositor(std::unique_ptr<PictureScene> scene);
+  std::unique_ptr<PictureScene> scene_;
 };
 
 }  // namespace lumel

@@ -1,5 +1,10 @@
-// What a load may reach.
+// What a load may reach, and what it is given beside the file.
 #pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace lumel {
 
@@ -14,6 +19,7 @@ enum class LightUnits {
 struct LoadOptions {
   bool allowOutsidePaths = false;  // buffers and images outside the scene's folder
   LightUnits lightUnits = LightUnits::Auto;
+  std::vector<std::pair<std::string, std::filesystem::path>> ssbump = {};  // names of materials, and their maps
 };
 
 }  // namespace lumel

@@ -6,6 +6,7 @@
 #include "scene/gltf/gltf_material.h"
 #include "scene/gltf/gltf_mesh.h"
 #include "scene/gltf/gltf_nodes.h"
+#include "scene/images/ssbump_maps.h"
 
 namespace lumel {
 namespace {
@@ -31,6 +32,7 @@ Expected<Scene> load(std::vector<std::uint8_t> bytes, const std::string& name, c
   Scene scene;
   scene.report.warnings = document->warnings;
   if (auto loaded = loadMaterials(*document, scene); !loaded) return loaded.error();
+  if (auto assigned = assignSsbumpMaps(scene, options); !assigned) return assigned.error();
   auto uses = flattenNodes(*document, scene);
   if (!uses) return uses.error();
   if (auto loaded = loadMeshes(*document, *uses, scene); !loaded) return loaded.error();

@@ -5,6 +5,7 @@
 
 #include "scene/files/file_access.h"
 #include "scene/images/image_type.h"
+#include "scene/images/ssbump_maps.h"
 
 namespace lumel {
 namespace {
@@ -49,6 +50,7 @@ class MaterialLoader {
   int image(int fileImage);
   int noImage();
   Expected<ImageSource> load(const GltfImage& image, std::size_t index);
+  Expected<void> readSsbump(const tinygltf::Material& source, std::size_t index);
 
   const GltfDocument& document_;
   Scene& scene_;
@@ -117,6 +119,8 @@ Material MaterialLoader::convert(const tinygltf::Material& source) {
   material.metallicRoughnessMap = refOf(pbr.metallicRoughnessTexture);
   material.normalMap = refOf(source.normalTexture);
   material.normalScale = toFloat(source.normalTexture.scale);
+  material.occlusionMap = refOf(source.occlusionTexture);
+  material.occlusionStrength = toFloat(source.occlusionTexture.strength);
   material.emission = vec3Of(source.emissiveFactor);
   material.emissionMap = refOf(source.emissiveTexture);
   material.alphaMode = source.alphaMode == "MASK"    ? AlphaMode::Mask
@@ -187,6 +191,47 @@ Expected<ImageSource> MaterialLoader::load(const GltfImage& image, std::size_t i
   return source;
 }
 
+/// "extras": {"lumel": {"ssbump": {"file": "wall.png", "convention": "squared", "hand": "right", "texCoord": 0}}}
+Expected<void> MaterialLoader::readSsbump(const tinygltf::Material& source, std::size_t index) {
+  if (!source.extras.IsObject() || !source.extras.Has("lumel")) return {};
+  const std::string place = "materials/" + std::to_string(index) + "/extras/lumel";
+  const auto& lumel = source.extras.Get("lumel");
+  if (!lumel.IsObject())
+    return document_.error(place, "must be an object such as {\"ssbump\": {\"file\": \"wall.png\"}}");
+  for (const std::string& key : lumel.Keys())
+    if (key != "ssbump") return document_.error(place, "'" + key + "' is not known; use ssbump");
+  if (!lumel.Has("ssbump")) return {};
+  const auto& ssbump = lumel.Get("ssbump");
+  if (!ssbump.IsObject() || !ssbump.Has("file") || !ssbump.Get("file").IsString())
+    return document_.error(place + "/ssbump", "must name a file: {\"file\": \"wall.png\"}");
+  Material& material = scene_.materials[index];
+  std::optional<int> uvSet;
+  for (const std::string& key : ssbump.Keys()) {
+    const auto& value = ssbump.Get(key);
+    const std::string text = value.IsString() ? value.Get<std::string>() : "";
+    if (key == "convention") {
+      if (text != "squared" && text != "linear" && text != "mod2x")
+        return document_.error(place + "/ssbump/convention", "must be squared, linear or mod2x");
+      material.ssbumpForm = text;
+    } else if (key == "hand") {
+      if (text != "right" && text != "left") return document_.error(place + "/ssbump/hand", "must be right or left");
+      material.ssbumpHand = text;
+    } else if (key == "texCoord") {
+      if (!value.IsInt() || value.Get<int>() < 0)
+        return document_.error(place + "/ssbump/texCoord", "must be the number of a UV set");
+      uvSet = value.Get<int>();
+    } else if (key != "file") {
+      return document_.error(place + "/ssbump", "'" + key + "' is not known; use file, convention, hand or texCoord");
+    }
+  }
+  auto file = resolveReference(document_.folder, ssbump.Get("file").Get<std::string>(), document_.options);
+  if (!file) return document_.error(place + "/ssbump/file", file.error().message);
+  if (auto set = setSsbumpMap(scene_, material, *file); !set)
+    return document_.error(place + "/ssbump/file", set.error().message);
+  if (uvSet) material.ssbumpMap.uvSet = *uvSet;
+  return {};
+}
+
 Expected<void> MaterialLoader::run() {
   for (const auto& source : document_.model.materials) scene_.materials.push_back(convert(source));
   const auto& meshes = document_.model.meshes;
@@ -203,6 +248,8 @@ Expected<void> MaterialLoader::run() {
     if (!source) return source.error();
     scene_.images.push_back(*std::move(source));
   }
+  for (std::size_t i = 0; i < document_.model.materials.size(); ++i)
+    if (auto read = readSsbump(document_.model.materials[i], i); !read) return read;
   return {};
 }
 

@@ -18,8 +18,8 @@ void replaceMissingMaps(Scene& scene) {
     if (isMissing(material.baseColorMap))
       material.baseColor = Vec4(kMissingColor * Vec3(material.baseColor), material.baseColor.w);
     if (isMissing(material.emissionMap)) material.emission = Vec3(0.0f);
-    for (TextureRef* ref :
-         {&material.baseColorMap, &material.emissionMap, &material.normalMap, &material.metallicRoughnessMap})
+    for (TextureRef* ref : {&material.baseColorMap, &material.emissionMap, &material.normalMap, &material.ssbumpMap,
+                            &material.occlusionMap, &material.metallicRoughnessMap})
       if (isMissing(*ref)) *ref = {};
   }
 }

@@ -4,6 +4,7 @@
 #include <map>
 #include <unordered_map>
 
+#include "scene/images/ssbump_maps.h"
 #include "scene/obj/obj_material.h"
 #include "scene/obj/obj_parser.h"
 #include "scene/triangles/polygon.h"
@@ -134,6 +135,7 @@ Expected<Scene> build(std::string_view text, const std::string& name, const std:
   scene.report.warnings = file->warnings;
   scene.report.skippedPrimitives = file->linesAndPoints;
   if (auto loaded = loadObjMaterials(*file, name, folder, options, scene); !loaded) return loaded.error();
+  if (auto assigned = assignSsbumpMaps(scene, options); !assigned) return assigned.error();
   for (const ObjShape& shape : file->shapes) {
     Mesh mesh = ShapeBuilder(*file, shape, static_cast<int>(scene.materials.size()) - 1).run();
     for (Primitive& primitive : mesh.primitives)

@@ -150,14 +150,16 @@ void finishPrimitive(Primitive& primitive, const Material& material, LoadReport&
       }
     warn(bad, "texture coordinates are not finite; read as 0");
   }
-  if (!material.normalMap || !primitive.tangents.empty()) return;
-  const auto set = static_cast<std::size_t>(material.normalMap.uvSet);
+  const bool bumped = static_cast<bool>(material.ssbumpMap);
+  const TextureRef& map = bumped ? material.ssbumpMap : material.normalMap;
+  if (!map || !primitive.tangents.empty()) return;
+  const auto set = static_cast<std::size_t>(map.uvSet);
   if (set >= primitive.uvSets.size() || primitive.uvSets[set].empty()) {
-    report.warnings.push_back(primitive.name + ": has no TEXCOORD_" + std::to_string(set) +
-                              ", which the normal map of material '" + material.name + "' reads");
+    report.warnings.push_back(primitive.name + ": has no TEXCOORD_" + std::to_string(set) + ", which the " +
+                              (bumped ? "ssbump" : "normal") + " map of material '" + material.name + "' reads");
     return;
   }
-  makeTangents(primitive, set, material.normalMap.uvMatrix);
+  makeTangents(primitive, set, map.uvMatrix);
 }
 
 std::vector<std::uint32_t> weldPositions(const std::vector<Vec3>& positions) {

@@ -84,6 +84,33 @@ std::optional<MapForm> formFromMetadata(const LoadedImage& image) {
   return MapForm{Encoding{*c, *h}, Green::Up};
 }
 
+Expected<Encoding> materialEncoding(const LoadedImage& image, const std::string& convention, const std::string& hand) {
+  if (image.image.channels < 3) return inputError("has fewer than three channels; an ssbump map has three");
+  const auto form = formFromMetadata(image);
+  if (form && !form->encoding) return inputError("is a normal map; make an ssbump map from it (lumel ssbump --help)");
+  if (image.image.channels > 4)
+    return inputError("has " + std::to_string(image.image.channels) + " directions; a lightmap has the three RNM ones");
+  Encoding encoding;
+  if (form) encoding = *form->encoding;
+  if (!convention.empty()) {
+    const auto stated = parseConvention(convention);
+    if (!stated) return stated.error();
+    if (form && *stated != encoding.convention)
+      return inputError(std::string("holds ") + nameOf(encoding.convention) + " weights by its metadata, and " +
+                        convention + " by what the scene says");
+    encoding.convention = *stated;
+  }
+  if (!hand.empty()) {
+    const auto stated = parseHand(hand);
+    if (!stated) return stated.error();
+    if (form && *stated != encoding.hand)
+      return inputError(std::string("is ") + nameOf(encoding.hand) + "-handed by its metadata, and " + hand +
+                        "-handed by what the scene says");
+    encoding.hand = *stated;
+  }
+  return encoding;
+}
+
 Expected<Image> readAlbedo(const std::filesystem::path& file, const Progress& progress) {
   auto loaded = readImage(file, progress);
   if (!loaded) return loaded.error();

@@ -42,4 +42,9 @@ Expected<Image> readAlbedo(const std::filesystem::path& file, const Progress& pr
 /// The form that a file's metadata names, if it names one.
 std::optional<MapForm> formFromMetadata(const LoadedImage& image);
 
+/// What the channels of a material's map hold: as its metadata say, else as stated (words of parseConvention and
+/// parseHand), else squared and right-handed. Errors: Input, without a name: fewer than three channels, a normal map,
+/// another basis than the RNM one, or metadata that contradict what is stated.
+Expected<Encoding> materialEncoding(const LoadedImage& image, const std::string& convention, const std::string& hand);
+
 }  // namespace lumel::ssbump

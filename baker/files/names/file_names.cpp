@@ -11,6 +11,10 @@ namespace {
 constexpr const char* kFlat = "flat";
 constexpr const char* kAux = "aux";
 constexpr const char* kMasks = "masks";
+constexpr std::pair<std::string_view, std::string_view> kImageExtensions[] = {
+    {"image/png", ".png"},   {"image/jpeg", ".jpg"},       {"image/webp", ".webp"},
+    {"image/bmp", ".bmp"},   {"image/tiff", ".tif"},       {"image/vnd.radiance", ".hdr"},
+    {"image/x-exr", ".exr"}, {"image/vnd-ms.dds", ".dds"}, {"image/gif", ".gif"}};
 
 bool isPageImage(const std::string& name) {
   constexpr std::string_view prefix = "lightmap-";
@@ -23,10 +27,27 @@ bool isPageImage(const std::string& name) {
          std::any_of(knownMapNames().begin(), knownMapNames().end(), isRest);
 }
 
+bool isSsbumpMap(const std::string& name) {
+  constexpr std::string_view prefix = "ssbump-";
+  if (name.rfind(prefix, 0) != 0) return false;
+  const std::size_t dot = name.find_first_not_of("0123456789", prefix.size());
+  if (dot == std::string::npos || dot == prefix.size()) return false;
+  const std::string rest = name.substr(dot);
+  return std::any_of(std::begin(kImageExtensions), std::end(kImageExtensions),
+                     [&rest](const auto& known) { return rest == known.second; });
+}
+
 }  // namespace
 
 std::string pageFileName(std::size_t page, const std::string& kind) {
   return "lightmap-" + std::to_string(page) + "-" + kind + ".exr";
+}
+
+std::string ssbumpFileName(int image, const std::string& mimeType) {
+  const auto* found = std::find_if(std::begin(kImageExtensions), std::end(kImageExtensions),
+                                   [&](const auto& known) { return known.first == mimeType; });
+  const std::string extension(found == std::end(kImageExtensions) ? ".png" : found->second);
+  return "ssbump-" + std::to_string(image) + extension;
 }
 
 std::vector<std::string> lightKinds(const std::vector<std::string>& mapNames) {
@@ -36,7 +57,7 @@ std::vector<std::string> lightKinds(const std::vector<std::string>& mapNames) {
 }
 
 bool isBakeFile(const std::string& name) {
-  return isPageImage(name) || name == "sky.exr" || name == "scene.glb" || name == "bake.json";
+  return isPageImage(name) || isSsbumpMap(name) || name == "sky.exr" || name == "scene.glb" || name == "bake.json";
 }
 
 }  // namespace lumel

@@ -12,6 +12,9 @@ bool isBakeFile(const std::string& name);
 /// File name of a page's image. `kind`: the name of a map, "flat" or "aux".
 std::string pageFileName(std::size_t page, const std::string& kind);
 
+/// File name of a material's ssbump map, image number `image` of the scene, of that MIME type.
+std::string ssbumpFileName(int image, const std::string& mimeType);
+
 /// The kinds of a page's images that hold light: an encoding's maps and the flat one, each once.
 std::vector<std::string> lightKinds(const std::vector<std::string>& mapNames);
 

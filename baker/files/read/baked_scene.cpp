@@ -55,7 +55,7 @@ class Reader {
   std::string path_;
 };
 
-Expected<void> readPages(const Reader& root, const fs::path& dir, BakedScene& baked) {
+Expected<void> readPages(const Reader& root, const fs::path& dir, const PageExtras& extras, BakedScene& baked) {
   const auto pages = root.at("pages");
   if (!pages) return pages.error();
   if (!pages->json().is_array()) return pages->wrong("a list");
@@ -73,14 +73,20 @@ Expected<void> readPages(const Reader& root, const fs::path& dir, BakedScene& ba
     texels += *covered;
     light += Vec3d(*mean) * *covered;
     std::vector<Image>& maps = baked.pages.emplace_back();
-    for (const std::string& name : baked.encoding->mapNames()) {
-      const fs::path file = dir / pageFileName(i, name);
+    std::vector<std::string> names = baked.encoding->mapNames();
+    if (extras.flat) names.push_back("flat");
+    if (extras.aux) names.push_back("aux");
+    for (std::size_t k = 0; k < names.size(); ++k) {
+      const fs::path file = dir / pageFileName(i, names[k]);
       auto loaded = readImage(file);
       if (!loaded) return loaded.error();
-      if (loaded->image.channels != 3 || loaded->image.width != static_cast<int>(*width) ||
+      const bool isAux = extras.aux && k + 1 == names.size();
+      if ((loaded->image.channels != 3 && !isAux) || loaded->image.width != static_cast<int>(*width) ||
           loaded->image.height != static_cast<int>(*height))
         return inputError(file.string() + ": its size or channels differ from bake.json; bake again");
-      maps.push_back(std::move(loaded->image));
+      if (isAux) baked.auxChannels = loaded->channelNames;
+      std::vector<Image>& into = k < baked.encoding->mapCount() ? maps : isAux ? baked.aux : baked.flat;
+      into.push_back(std::move(loaded->image));
     }
   }
   if (texels > 0.0) baked.meanFlat = Vec3(light / texels);
@@ -162,7 +168,7 @@ Expected<std::shared_ptr<const Encoding>> encodingOf(const Json& bake, const std
                     (version.is_string() ? version.get<std::string>() : "?") + ", which baked it, or bake again");
 }
 
-Expected<BakedScene> readBake(const fs::path& dir) {
+Expected<BakedScene> readBake(const fs::path& dir, const PageExtras& extras) {
   const auto json = readBakeJson(dir);
   if (!json) return json.error();
   const std::string file = (dir / "bake.json").string();
@@ -175,7 +181,7 @@ Expected<BakedScene> readBake(const fs::path& dir) {
   if (!scene) return scene.error();
   baked.scene = std::move(*scene);
   if (auto done = readSky(root, dir, baked.scene.environment); !done) return done.error();
-  if (auto done = readPages(root, dir, baked); !done) return done.error();
+  if (auto done = readPages(root, dir, extras, baked); !done) return done.error();
   if (auto done = checkPages(baked, dir / "scene.glb"); !done) return done.error();
   return baked;
 }

@@ -17,6 +17,9 @@ struct BakedScene {
   Scene scene;                                               // scene.glb, with the sky of the bake as its environment
   std::shared_ptr<const Encoding> encoding = rnmEncoding();  // as bake.json says
   std::vector<std::vector<Image>> pages;                     // the encoding's maps, page by page
+  std::vector<Image> flat;                                   // the flat map, page by page
+  std::vector<Image> aux;                                    // what is known of texels (PageExtras), page by page
+  std::vector<std::string> auxChannels;                      // "coverage", ...
   Vec3 meanFlat{0, 0, 0};                                    // mean irradiance / pi over all covered texels
 };
 
@@ -27,8 +30,14 @@ Expected<nlohmann::ordered_json> readBakeJson(const std::filesystem::path& dir);
 /// the only one before there was that key, and differs in nothing else. Errors: Input, naming place and cause.
 Expected<std::shared_ptr<const Encoding>> encodingOf(const nlohmann::ordered_json& bake, const std::string& file);
 
+/// Which of a page's images are read beside the encoding's maps.
+struct PageExtras {
+  bool flat = false;
+  bool aux = false;
+};
+
 /// Reads bake.json, scene.glb, the encoding's maps and the sky. Every page that a node or primitive names
 /// exists. Errors: Input, naming the file that is missing, unreadable or does not fit the others.
-Expected<BakedScene> readBake(const std::filesystem::path& dir);
+Expected<BakedScene> readBake(const std::filesystem::path& dir, const PageExtras& extras = {});
 
 }  // namespace lumel

@@ -1,6 +1,7 @@
 #include "baker/files/write/bake_files.h"
 
 #include <algorithm>
+#include <set>
 
 #include "baker/files/names/conventions.h"
 #include "baker/files/names/file_names.h"
@@ -126,6 +127,14 @@ Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasRes
     if (!file) return file.error();
     return writeBytes(*file, bytes);
   };
+  std::set<int> ssbumpMaps;
+  for (const Material& material : scene.materials)
+    if (material.ssbumpMap) ssbumpMaps.insert(material.ssbumpMap.image);
+  for (const int image : ssbumpMaps) {
+    const ImageSource& source = scene.images[static_cast<std::size_t>(image)];
+    const std::string name = ssbumpFileName(image, source.mimeType);
+    if (auto done = writeFile(name.c_str(), std::span(&source.encoded, 1)); !done) return done;
+  }
   const auto glb = encodeGlb(scene, atlas.atlas, record.sceneForm);
   if (!glb) return glb.error();
   if (auto done = writeFile("scene.glb", std::span<const std::vector<std::uint8_t>>(*glb)); !done) return done;

@@ -3,6 +3,7 @@
 #include <map>
 #include <tuple>
 
+#include "baker/files/names/file_names.h"
 #include "scene/images/image_io.h"
 #include "scene/images/image_type.h"
 
@@ -51,7 +52,10 @@ class MaterialWriter {
     json["pbrMetallicRoughness"] = std::move(pbr);
     if (addTexture(json, "normalTexture", m.normalMap) && m.normalScale != 1.0f)
       json["normalTexture"]["scale"] = m.normalScale;
+    if (addTexture(json, "occlusionTexture", m.occlusionMap) && m.occlusionStrength != 1.0f)
+      json["occlusionTexture"]["strength"] = m.occlusionStrength;
     addEmission(json, m);
+    addSsbump(json, m);
     if (m.alphaMode == AlphaMode::Mask) {
       json["alphaMode"] = "MASK";
       json["alphaCutoff"] = m.alphaCutoff;
@@ -81,6 +85,17 @@ class MaterialWriter {
     if (strength == 1.0f) return;
     json["extensions"]["KHR_materials_emissive_strength"] = {{"emissiveStrength", strength}};
     out_.extensionsUsed.insert("KHR_materials_emissive_strength");
+  }
+
+  /// A file beside scene.glb: GLB images are PNG and JPEG, without the metadata and the floats of ssbump maps.
+  void addSsbump(Json& json, const Material& m) {
+    if (!m.ssbumpMap) return;
+    Json ssbump = {{"file", ssbumpFileName(m.ssbumpMap.image,
+                                           scene_.images[static_cast<std::size_t>(m.ssbumpMap.image)].mimeType)}};
+    if (!m.ssbumpForm.empty()) ssbump["convention"] = m.ssbumpForm;
+    if (!m.ssbumpHand.empty()) ssbump["hand"] = m.ssbumpHand;
+    if (m.ssbumpMap.uvSet != 0) ssbump["texCoord"] = writtenUvSet(m.ssbumpMap.uvSet);
+    json["extras"]["lumel"]["ssbump"] = std::move(ssbump);
   }
 
   bool addTexture(Json& parent, const char* key, const TextureRef& ref) {

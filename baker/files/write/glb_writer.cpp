@@ -32,7 +32,8 @@ std::string base64(const std::string& bytes) {
 
 std::set<int> uvSetsOf(const Material& m) {
   std::set<int> sets;
-  for (const TextureRef* ref : {&m.baseColorMap, &m.metallicRoughnessMap, &m.normalMap, &m.emissionMap})
+  for (const TextureRef* ref :
+       {&m.baseColorMap, &m.metallicRoughnessMap, &m.normalMap, &m.emissionMap, &m.occlusionMap, &m.ssbumpMap})
     if (*ref) sets.insert(ref->uvSet);
   return sets;
 }
