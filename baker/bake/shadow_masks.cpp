@@ -151,8 +151,7 @@ Expected<std::vector<Image>> bakeShadowMasks(const LitScene& scene, const std::v
   std::vector<PunctualLights> alone;
   for (const std::size_t light : marked) alone.push_back(aloneOf(lights[light]));
   std::vector<LightTransport> lamps;
-  for (const PunctualLights& light : alone)
-    lamps.push_back({transport.rays, transport.materials, light, transport.emissive, transport.environment});
+  for (const PunctualLights& light : alone) lamps.push_back(transport.with(light));
   std::vector<Image> masks;
   for (const BakedPage& page : pages) masks.emplace_back(page.aux.width, page.aux.height, 4);
   const Waves waves(texels);

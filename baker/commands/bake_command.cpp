@@ -212,7 +212,7 @@ Expected<void> checkShadowMasks(const BakeArguments& a, Scene& scene) {
 void printSettings(const nlohmann::ordered_json& settings) {
   std::string line = "settings";
   for (const auto& [key, value] : settings.items()) {
-    if (value.is_null()) continue;
+    if (value.is_null() || value == "auto") continue;
     line += " " + key + "=" + (value.is_string() ? value.get<std::string>() : value.dump());
   }
   std::fprintf(stderr, "%s\n", line.c_str());

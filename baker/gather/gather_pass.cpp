@@ -79,7 +79,7 @@ Vec3 lightOf(const GatherScene& scene, const GatherState& state, std::size_t tex
   const Vec3& sum = scene.levels.endless ? state.sums.flat[texel] : state.levelSums[texel * scene.stored() + level];
   const float weight = state.weightOf(texel);
   const Vec3 gathered = sum / weight;
-  if (!scene.indirectOnly) return gathered;
+  if (!scene.leavesLightOut()) return gathered;
   return gathered + state.direct[texel] + state.seen[texel] / (static_cast<float>(kWarmRays) + weight);
 }
 

@@ -170,7 +170,7 @@ GatherState::GatherState(const GatherScene& scene) : waves(scene.waves.size()), 
   if (scene.levels.count == 0) return;
   reflectance.resize(count);
   if (!scene.levels.endless) radiance.resize(count * scene.stored());  // else it is what the warm-up ends with
-  if (!scene.indirectOnly) return;
+  if (!scene.leavesLightOut()) return;
   direct.resize(count);
   seen.resize(count);
 }
@@ -198,7 +198,7 @@ void GatherState::dropCache() {
 bool GatherState::fits(const GatherScene& scene) const {
   const std::size_t count = scene.map.size();
   const std::size_t cached = scene.levels.count > 0 ? count : 0;
-  const std::size_t shining = scene.indirectOnly ? cached : 0;
+  const std::size_t shining = scene.leavesLightOut() ? cached : 0;
   const std::size_t summed = isWarm ? count : 0;
   const auto has = [](const auto& values, std::size_t wanted) { return values.size() == wanted; };
   bool fit = has(waves, scene.waves.size()) && has(errors.ofWaves, scene.waves.size()) && has(errors.squares, count) &&

@@ -80,7 +80,8 @@ struct GatherState {
   std::vector<PackedColor> reflectance;
   std::vector<PackedColor> radiance;  // that the texel reflects: levels.count each
   std::vector<std::uint8_t> uneven;   // WarmTexel::isUneven
-  // With indirectOnly alone: light from light samples; sums of what the rays of all passes saw shine.
+  // With GatherScene::leavesLightOut alone: light from light samples that the maps leave out; with indirectOnly sums of
+  // what the rays of all passes saw shine.
   std::vector<Vec3> direct;
   std::vector<Vec3> seen;
 

@@ -169,8 +169,9 @@ Expected<void> warmUp(const GatherScene& scene, GatherState& state, Progress& pr
       constant[t] = first[t] + warm[i].relit;
       state.backFaces[t] = static_cast<std::uint32_t>(std::popcount(warm[i].backs));
       state.uneven[t] = warm[i].isUneven() ? 1 : 0;
+      if (!scene.leavesLightOut()) continue;
+      state.direct[t] = scene.indirectOnly ? warm[i].direct : warm[i].hidden;
       if (!scene.indirectOnly) continue;
-      state.direct[t] = warm[i].direct;
       state.seen[t] = warm[i].seen * static_cast<float>(kWarmRays);
     }
   });

@@ -16,12 +16,16 @@ struct LightTransport {
   const PunctualLights& punctual;
   const EmissiveTriangles& emissive;
   const EnvironmentLight& environment;
-  /// Those of `punctual` whose light counts where it arrives straight (LightMode::All); null: all of them.
+  /// Those of `punctual` whose light counts where it arrives straight (LightMode::All), and the others; null: it counts
+  /// of all of them.
   const PunctualLights* straight = nullptr;
+  const PunctualLights* hidden = nullptr;
 
   /// The same scene with the lamps whose light texels take straight: `punctual` is for hits.
-  LightTransport atTexels() const {
-    return {rays, materials, straight != nullptr ? *straight : punctual, emissive, environment, straight};
+  LightTransport atTexels() const { return with(straight != nullptr ? *straight : punctual); }
+  /// The same scene with other lamps.
+  LightTransport with(const PunctualLights& lamps) const {
+    return {rays, materials, lamps, emissive, environment, straight, hidden};
   }
 
   /// Tells whether a ray can bring light back by itself, by what it hits or by leaving the scene.

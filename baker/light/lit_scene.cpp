@@ -6,10 +6,11 @@
 namespace lumel {
 namespace {
 
-std::unique_ptr<PunctualLights> straightLights(const std::vector<Light>& lights) {
+/// Those of one of the two modes that light something, where both are there to be told apart.
+std::unique_ptr<PunctualLights> lightsOf(const std::vector<Light>& lights, bool (*ofMode)(LightMode)) {
   if (std::ranges::none_of(lights, [](const Light& light) { return light.mode == LightMode::Indirect; }))
     return nullptr;
-  return std::make_unique<PunctualLights>(lights, [](LightMode mode) { return mode == LightMode::All; });
+  return std::make_unique<PunctualLights>(lights, ofMode);
 }
 
 }  // namespace
@@ -21,10 +22,11 @@ LitScene::LitScene(const Scene& scene, std::unique_ptr<Materials> materials, std
       materials_(std::move(materials)),
       rays_(std::move(rays)),
       punctual_(scene.lights, [](LightMode mode) { return mode != LightMode::None; }),
-      straight_(straightLights(scene.lights)),
+      straight_(lightsOf(scene.lights, [](LightMode mode) { return mode == LightMode::All; })),
+      hidden_(lightsOf(scene.lights, [](LightMode mode) { return mode == LightMode::Indirect; })),
       emissive_(*rays_, *materials_),
       environment_(scene.environment),
-      transport_{*rays_, *materials_, punctual_, emissive_, environment_, straight_.get()} {}
+      transport_{*rays_, *materials_, punctual_, emissive_, environment_, straight_.get(), hidden_.get()} {}
 
 Expected<std::unique_ptr<LitScene>> LitScene::build(const Scene& scene, bool needsAlbedo) {
   std::vector<std::string> notes;

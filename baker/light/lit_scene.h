@@ -36,7 +36,7 @@ class LitScene {
   std::unique_ptr<Materials> materials_;
   std::unique_ptr<RayScene> rays_;
   PunctualLights punctual_;
-  std::unique_ptr<PunctualLights> straight_;  // null: all of punctual_
+  std::unique_ptr<PunctualLights> straight_, hidden_;  // LightTransport
   EmissiveTriangles emissive_;
   EnvironmentLight environment_;
   LightTransport transport_;

@@ -70,6 +70,9 @@ struct GatherScene {
     return {from, to};
   }
 
+  /// Tells whether texels reflect light that is not in their maps: that of the warm-up's light samples stands for it.
+  bool leavesLightOut() const { return indirectOnly || transport.hidden != nullptr; }
+
   /// Levels of the cache, as the length of a row.
   std::size_t stored() const { return static_cast<std::size_t>(levels.count); }
 };

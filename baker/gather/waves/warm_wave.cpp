@@ -104,19 +104,38 @@ Vec3 WarmWave::meanReflectance(const WarmAlbedos& albedos) const {
 }
 
 void WarmWave::warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts) {
-  const LightTransport transport = wave_.scene.transport.atTexels();
-  PunctualChoice punctual = punctualChoice(transport.punctual, {}, {});
+  PunctualChoice punctual = punctualChoice(wave_.scene.transport.punctual, {}, {});
   for (std::uint32_t s = 0; s < kWarmLights; ++s) {
     const ReceiverLanes receivers = wave_.points[s].receivers();
     wave_.lightSamples.setSampleOfAll(s);
     counts.shadowRays += directLight(
-        transport, receivers, wave_.lightSamples, 0, TraceMode::Packet, kGatherDensity,
+        wave_.scene.transport, receivers, wave_.lightSamples, 0, TraceMode::Packet, kGatherDensity,
         [&](int lane, const Vec3& wi, const Vec3& light) {
           const auto l = static_cast<std::size_t>(lane);
           const Vec3 flat = light * (glm::dot(wi, receivers.ns[l]) * kInvPi);
           if (isFinite(flat)) texels[l].direct += flat / static_cast<float>(kWarmLights);
         },
         punctual.learnt.isUseful() ? &punctual : nullptr);
+  }
+}
+
+/// Lamps that light by bounces alone: what texels reflect of them is known from here.
+void WarmWave::warmHidden(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts) {
+  const LightTransport hidden = wave_.scene.transport.with(*wave_.scene.transport.hidden);
+  SampledLight sampled;
+  for (std::uint32_t s = 0; s < kWarmLights && !hidden.punctual.empty(); ++s) {
+    const ReceiverLanes receivers = wave_.points[s].receivers();
+    wave_.lightSamples.setSampleOfAll(s);
+    const std::uint64_t rays =
+        takeLight(hidden, {LightStrategy::EveryPunctual}, receivers, wave_.lightSamples, 0, kGatherDensity, sampled);
+    if (rays == 0) continue;
+    counts.shadowRays += rays;
+    sampled.trace(hidden.rays, TraceMode::Packet);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      if (!sampled.found(lane)) continue;
+      const Vec3 flat = sampled.light[lane] * (glm::dot(sampled.wi[lane], receivers.ns[lane]) * kInvPi);
+      if (isFinite(flat)) texels[lane].hidden += flat / static_cast<float>(kWarmLights);
+    }
   }
 }
 
@@ -130,6 +149,7 @@ std::array<WarmTexel, kLanes> WarmWave::warmUp(std::span<CacheLink> links, Gathe
     if (lane > 0 && wave_.covered[lane - 1]) texels[lane - 1].reflectance = meanReflectance(albedos[(lane - 1) % 2]);
   }
   warmDirect(texels, counts);
+  if (wave_.scene.transport.hidden != nullptr) warmHidden(texels, counts);
 
   WarmSink sink{texels, links};
   GatherTracer tracer(wave_.scene.transport, wave_.scene.map, wave_.scene.reflectance, wave_.scene.lastDepth,

@@ -23,6 +23,7 @@ Vec3 unpackWeight(std::uint32_t packed);
 struct WarmTexel {
   Vec3 reflectance{0};      // mean over the texel
   Vec3 direct{0};           // irradiance / pi from light samples
+  Vec3 hidden{0};           // the part of it that the maps leave out: of lamps in LightTransport::hidden
   Vec3 seen{0};             // the same from what rays see shine by itself
   Vec3 relit{0};            // the same from hits without texels: light of one bounce and more
   std::uint32_t backs = 0;  // bits of the rays that met backs
@@ -55,6 +56,7 @@ class WarmWave {
   float shareOf(const TriangleRef& triangle) const;
   TrianglePoint sourceOf(const PlaceOnTriangle& place) const;
   void warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts);
+  void warmHidden(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts);
 
   WaveTexels wave_;
 };
