@@ -55,10 +55,10 @@ struct Light {
   float range = 0.0f;   // metres; 0 = unlimited; attenuation window as the extension recommends
   float innerConeAngle = 0.0f;
   float outerConeAngle = kPi / 4;
-  Vec2 size{0, 0};                              // metres: sides of a rectangle
-  float radius = 0.0f;                          // metres: of discs and spheres, and of points and spots that are soft
-  float halfAngle = 0.0f;                       // radians: half of what a directional light fills of the sky across
-  std::shared_ptr<const LightProfile> profile;  // of points, spots and spheres: a factor by direction; null: none
+  Vec2 size{0, 0};         // metres: sides of a rectangle
+  float radius = 0.0f;     // metres: of discs and spheres, and of points and spots that are soft
+  float halfAngle = 0.0f;  // radians: half of what a directional light fills of the sky across
+  std::shared_ptr<const LightProfile> profile = {};  // of points, spots and spheres: a factor by direction; null: none
   LightMode mode = LightMode::All;
   bool hasShadowMask = false;  // its visibility is baked where shadow masks are asked for
 };

@@ -61,8 +61,8 @@ struct Instance {
   std::string name;  // of the node; never empty, not always unique
   int mesh = 0;
   Mat4 worldFromObject{1.0f};  // may mirror (negative determinant)
-  ObjectSettings settings;
-  LightmapPlace lightmap;  // extras.lumel.page, scale and offset of the node of a baked scene
+  ObjectSettings settings{};
+  LightmapPlace lightmap{};  // extras.lumel.page, scale and offset of the node of a baked scene
 
   /// The page of a primitive's lightmap; -1: it has none.
   int lightmapPageOf(const Primitive& primitive) const {

@@ -154,11 +154,14 @@ void BM_Denoise(benchmark::State& state) {
     if (x % 101 < 96 && y % 101 < 96) charts[i] = static_cast<std::uint32_t>(1 + x / 101 + y / 101 * 11);
   }
   const std::vector<CoarseNormal> normals(charts.size(), CoarseNormal{0, 0, 127});
-  const std::vector<float> errors(charts.size(), 0.05f);
+  constexpr std::size_t kMaps = 4;
   for (auto _ : state) {
     Image flat = map;
     std::array<Image, 3> rnm = {map, map, map};
-    denoise(flat, rnm, charts, normals, errors);
+    std::vector<float> errors(kMaps * charts.size(), 0.05f);
+    std::array<ErrorPlane, kMaps> planes;
+    for (std::size_t i = 0; i < kMaps; ++i) planes[i] = {errors.data() + i, kMaps};
+    denoise(flat, rnm, charts, normals, planes);
     benchmark::DoNotOptimize(flat.pixels.data());
   }
 }
