@@ -288,7 +288,8 @@ TEST(Bake, ErrorOfTooFewSamplesIsNotZero) {
     EXPECT_EQ(error["standardErrors"].size(), known ? 4u : 0u);
     const auto aux = readImage(dir / "out" / "lightmap-0-aux.exr");
     ASSERT_TRUE(aux);
-    for (const char* name : {"stderr", "stderr0", "stderr2"}) EXPECT_EQ(std::isfinite(channel(*aux, name, 8, 8)), known);
+    for (const char* name : {"stderr", "stderr0", "stderr2"})
+      EXPECT_EQ(std::isfinite(channel(*aux, name, 8, 8)), known);
   }
 }
 
