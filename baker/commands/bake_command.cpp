@@ -87,7 +87,7 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
   options.choice(
       "projection", a.projection, {"raw", "flat", "fit", "signed"},
       "How light is spread over the three maps. flat: exact on flat normals, for gentle normal maps; under "
-      "grazing light a bump that faces it gets .27 where .50 is right. raw: clamped dots, .49 there, but .58 "
+      "grazing light a bump that faces it gets .27 where .50 is right. raw: clamped dots, .48 there, but .58 "
       "to .79 of the light of flat normals. fit: least squares for normals within 30 degrees, exact on flat "
       "ones. signed: plain dots, maps may be negative, to be decoded with linear weights");
   options.choice(
