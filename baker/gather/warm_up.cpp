@@ -17,13 +17,16 @@
 namespace lumel {
 namespace {
 
-/// Endless light: the warm-up ends where another bounce adds less than this share, or changes what all of them come to
-/// by less; or after so many. No more than kMostBeyond of the light is from bounces that were not followed, since rooms
-/// that are lit through others get theirs late; and none where each bounce has more than kSlowest of the light of the
-/// one before.
+/// Endless light: a wave has settled where another bounce adds less than this share of its own light, or changes what
+/// all of them come to by less. No more than kMostBeyond of its light is from bounces that were not followed, since
+/// rooms that are lit through others get theirs late; and none where each bounce has more than kSlowest of the light of
+/// the one before. The warm-up ends where all waves but this share have settled (in cracks light moves for long), or
+/// after so many sweeps. Places that do not see each other are judged each by its own light: beside a field in the sun
+/// a lamp's room is nothing to the sum of all.
 constexpr double kSettled = 1e-4;
 constexpr double kMostBeyond = 0.002;
 constexpr double kSlowest = 0.98;
+constexpr double kStillMoving = 1e-3;
 constexpr int kMostSweeps = 256;
 constexpr std::size_t kTexelGrain = 4096;
 constexpr std::size_t kWaveGrain = kTexelGrain / kLanes;
@@ -40,14 +43,27 @@ class Sweeping {
         substitutes_(substitutesFor(scene, state)),
         light_(std::move(first)),
         constant_(constant),
-        reflected_(light_.size()) {}
+        reflected_(light_.size()),
+        series_(scene.waves.size()) {}
 
   /// Sweeps until the light has settled, or as many times as the cache has levels, and fills the cache.
   void run();
 
  private:
-  void reflect(float beyond);
-  double sweep();
+  /// The light of a wave's texels, sum by sum: in the end every sweep adds the same share of what the one before it
+  /// did, and the rest is a geometric series.
+  struct Series {
+    double total = 0.0;
+    double added = 0.0;   // by the last sweep
+    double limit = 0.0;   // of the series as the last sweep lets it be seen
+    float beyond = 0.0f;  // times more of what the last sweep added: the rest, where it is known
+    bool settled = false;
+    void add(double next);
+  };
+
+  void reflect(bool addRest);
+  void sweep();
+  bool haveSettled() const;
   void keep(int level);
 
   const GatherScene& scene_;
@@ -58,29 +74,45 @@ class Sweeping {
   const std::span<const Vec3> constant_;
   // What links look up: one product instead of two values from all over the memory.
   std::vector<PackedColor> reflected_;
+  std::vector<Series> series_;  // of the waves
 };
 
-/// Finds what texels reflect of their light, and adds `beyond` times more of what the last sweep added to it.
-void Sweeping::reflect(float beyond) {
+void Sweeping::Series::add(double next) {
+  const double addedNow = next - total;
+  const double ratio = added > 0.0 ? std::clamp(addedNow / added, 0.0, kSlowest) : kSlowest;
+  const double rest = addedNow * ratio / (1.0 - ratio);
+  const bool known = rest <= kMostBeyond * next && std::abs(next + rest - limit) <= kSettled * next;
+  settled = known || addedNow <= kSettled * next;
+  beyond = known ? static_cast<float>(ratio / (1.0 - ratio)) : 0.0f;
+  total = next;
+  added = addedNow;
+  limit = next + rest;
+}
+
+/// Finds what texels reflect of their light; with `addRest` also of what sweeps to come would add.
+void Sweeping::reflect(bool addRest) {
   for (const TexelMap::Substitute& s : substitutes_) light_[s.texel] = light_[s.source];
-  parallelFor(light_.size(), kTexelGrain, [&](std::size_t first, std::size_t last) {
-    for (std::size_t t = first; t < last; ++t) {
-      Vec3 now = unpackColor(state_.reflectance[t]) * light_[t];
-      if (beyond > 0.0f) now += beyond * glm::max(now - unpackColor(reflected_[t]), Vec3(0.0f));
-      reflected_[t] = packColor(now);
+  parallelFor(series_.size(), kWaveGrain, [&](std::size_t first, std::size_t last) {
+    for (std::size_t w = first; w < last; ++w) {
+      const float beyond = addRest ? series_[w].beyond : 0.0f;
+      const std::size_t start = scene_.waves[w].start;
+      for (std::size_t t = start; t < start + scene_.waves[w].count; ++t) {
+        Vec3 now = unpackColor(state_.reflectance[t]) * light_[t];
+        if (beyond > 0.0f) now += beyond * glm::max(now - unpackColor(reflected_[t]), Vec3(0.0f));
+        reflected_[t] = packColor(now);
+      }
     }
   });
 }
 
-/// Passes on what texels reflect. Returns the sum of all light.
-double Sweeping::sweep() {
+/// Passes on what texels reflect.
+void Sweeping::sweep() {
   const Waves& waves = scene_.waves;
-  std::vector<double> parts((waves.size() + kWaveGrain - 1) / kWaveGrain);
   parallelFor(waves.size(), kWaveGrain, [&](std::size_t first, std::size_t last) {
-    double sum = 0.0;
     for (std::size_t w = first; w < last; ++w) {
       const std::size_t start = waves[w].start;
       WarmLinks::Reader link(links_, w, start * kWarmRays);
+      double sum = 0.0;
       for (std::size_t t = start; t < start + waves[w].count; ++t) {
         Vec3 found(0.0f);
         for (int ray = 0; ray < kWarmRays; ++ray, link.next())
@@ -88,12 +120,14 @@ double Sweeping::sweep() {
         light_[t] = constant_[t] + found / static_cast<float>(kWarmRays);
         sum += static_cast<double>(luminance(light_[t]));
       }
+      series_[w].add(sum);
     }
-    parts[first / kWaveGrain] = sum;
   });
-  double total = 0.0;
-  for (const double part : parts) total += part;
-  return total;
+}
+
+bool Sweeping::haveSettled() const {
+  const auto moving = std::ranges::count_if(series_, [](const Series& series) { return !series.settled; });
+  return static_cast<double>(moving) <= kStillMoving * static_cast<double>(series_.size());
 }
 
 void Sweeping::keep(int level) {
@@ -103,24 +137,15 @@ void Sweeping::keep(int level) {
 
 void Sweeping::run() {
   const CacheLevels& levels = scene_.levels;
-  reflect(0.0f);
+  reflect(false);
   if (!levels.endless && levels.base == 0) keep(0);
   const int sweeps = levels.endless ? kMostSweeps : levels.base + levels.count - 1;
-  double before = 0.0, addedBefore = 0.0, limitBefore = 0.0;
   for (int number = 1; number <= sweeps; ++number) {
-    const double total = sweep();
-    // In the end every sweep adds the same share of what the one before it did, and the rest is a geometric series.
-    const double added = total - before;
-    const double ratio = addedBefore > 0.0 ? std::clamp(added / addedBefore, 0.0, kSlowest) : kSlowest;
-    const double rest = added * ratio / (1.0 - ratio);
-    const bool known = rest <= kMostBeyond * total && std::abs(total + rest - limitBefore) <= kSettled * total;
-    const bool settled = levels.endless && (known || added <= kSettled * total);
-    reflect(settled && known ? static_cast<float>(ratio / (1.0 - ratio)) : 0.0f);
+    sweep();
+    const bool settled = levels.endless && haveSettled();
+    reflect(settled);
     if (settled) break;
     if (!levels.endless && number >= levels.base) keep(number - levels.base);
-    before = total;
-    addedBefore = added;
-    limitBefore = total + rest;
   }
   if (levels.endless) state_.radiance = std::move(reflected_);
 }
