@@ -423,23 +423,6 @@ SeamSteps Mender::steps(bool mended) const {
     }
     if (!(read[0] + read[1] > 0.0)) continue;
     const double step = 2.0 * std::abs(read[0] - read[1]) / (read[0] + read[1]);
-    if (getenv("SEAMDUMP") && mended) {
-      fprintf(stderr, "DUMP %.4f %.5g %.5g len %.4f m pts %.3f", step, read[0], read[1],
-              seams_.pairs[point.pair].length, point.texels);
-      for (std::size_t k = 0; k < 2; ++k) {
-        const auto& sd = seams_.pairs[point.pair].sides[k];
-        auto pl = sd.at({point.metres, 0});
-        fprintf(stderr, " | c%u %.2f %.2f dens %.2f %.2f", sd.chart, pl.x, pl.y, glm::length(sd.along),
-                glm::length(sd.out));
-        for (std::size_t tap = 0; tap < 4; ++tap) {
-          auto t = lookups[k].texels[tap];
-          fprintf(stderr, " %d:%.2f:%.3g(%.3g)", int(pages_[sd.page].states[t]), lookups[k].weights[tap],
-                  pages_[sd.page].flat->pixels[3 * t + 1],
-                  numbers_.isMarked(sd.page, t) ? unknowns_[numbers_.of(sd.page, t)].light.values[1] : -1);
-        }
-      }
-      fprintf(stderr, "\n");
-    }
     squares += static_cast<double>(point.texels) * step * step;
     texels += static_cast<double>(point.texels);
     steps.most = std::max(steps.most, step);

@@ -229,6 +229,7 @@ struct ImageWriter::State {
   std::unique_ptr<OIIO::ImageOutput> output;
   OIIO::ImageSpec spec;
   PixelFormat format = PixelFormat::Float;
+  bool mayHoldNan = false;
   int nextRow = 0;
   bool complete = false;
 
@@ -274,6 +275,7 @@ Expected<ImageWriter> ImageWriter::open(const PendingFile& file, int width, int 
   for (const auto& [key, value] : options.metadata) spec.attribute(key, value);
   state->file = file;
   state->format = options.format;
+  state->mayHoldNan = options.mayHoldNan;
   state->spec = std::move(spec);
   std::FILE* bytes = std::fopen(file.path.c_str(), "w+b");
   if (!bytes) return cannotWrite(file.place, std::strerror(errno));
@@ -293,7 +295,7 @@ Expected<void> ImageWriter::write(const Image& rows, const Progress& progress) {
       return s.file.place.string() + ": pixel (" + std::to_string(pixel % width) + ", " +
              std::to_string(pixel / width + static_cast<std::size_t>(s.nextRow)) + ")";
     };
-    if (std::isnan(v)) return failure(where() + " is not a number");
+    if (std::isnan(v) && !s.mayHoldNan) return failure(where() + " is not a number");
     if (s.format == PixelFormat::Half && std::abs(v) > 65504.0f)
       return failure(where() + " is " + std::to_string(v) + ", beyond half's 65504; write float");
   }

@@ -39,11 +39,12 @@ struct WriteImageOptions {
   /// EXR by run lengths instead of zip: of floats whose lower bits are noise zip makes files 5 to 9% smaller, in 13
   /// times the time.
   bool noisy = false;
+  bool mayHoldNan = false;  // values that stand for what is not known; else a NaN is an error
 };
 
 /// Writes by the file's extension, complete before a reader sees it (a FileSet of one). Values are stored as they are
 /// (no colour conversion). Errors: Failed (cannot write, or a value that the format cannot hold: a finite value beyond
-/// 65504 with Half, a NaN anywhere), Usage (unknown extension), Interrupted.
+/// 65504 with Half, a NaN unless options allow it), Usage (unknown extension), Interrupted.
 Expected<void> writeImage(const std::filesystem::path& file, const Image& image, const WriteImageOptions& options = {},
                           const Progress& progress = noProgress());
 

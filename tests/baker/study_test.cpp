@@ -110,7 +110,7 @@ TEST(Study, DenoisedBakesAreMeasuredBesideTheirOriginals) {
 TEST(Study, ProjectionsAndDensities) {
   std::map<Projection, double> residual;
   for (const StudyPoint* p : seriesOf(cornellStudy(), "projection")) residual[p->projection] = p->residual;
-  ASSERT_EQ(residual.size(), 3u);
+  ASSERT_EQ(residual.size(), 4u);
   EXPECT_GT(residual[Projection::Raw], residual[Projection::Flat]);
   const auto density = seriesOf(cornellStudy(), "density");
   ASSERT_EQ(density.size(), 3u);

@@ -234,13 +234,16 @@ TEST(Config, MistakesAre2WithFileAndLine) {
 TEST(Info, DescribesScenesImagesAndBakes) {
   const auto dir = scratch();
   const std::string scene = floorScene(dir);
-  const Outcome outcome = run({"info", scene, "--json", "--texels-per-meter", "10"});
+  const Outcome outcome = run({"info", scene, "--json", "--texels-per-meter", "10", "--uv", "generate"});
   ASSERT_EQ(outcome.exitCode, 0) << outcome.err;
   const auto json = nlohmann::json::parse(outcome.out, nullptr, false);
   EXPECT_EQ(json["kind"], "scene");
   EXPECT_EQ(json["triangles"], 2);
   EXPECT_EQ(json["materials"].size(), 1u);
   EXPECT_EQ(json["estimate"]["texels"], 400);  // 2 m x 2 m
+  // Its own TEXCOORD_1 is the whole page, whatever the density.
+  const Outcome own = run({"info", scene, "--json", "--texels-per-meter", "10", "--page-size", "64"});
+  EXPECT_EQ(nlohmann::json::parse(own.out, nullptr, false)["estimate"]["texels"], 64 * 64);
   // Under a sky image a bake takes what EnvironmentLight does: 12 bytes a pixel, 24 for each of 512 x 256 cells.
   ASSERT_TRUE(writeImage(dir / "sky.exr", Image(64, 32, 3, 1.0f)));
   const auto lit = nlohmann::json::parse(run({"info", scene, "--json", "--sky", dir / "sky.exr"}).out, nullptr, false);

@@ -46,7 +46,8 @@ TEST(Memory, OfTexelsIsToldAndBounded) {
   EXPECT_LT(large.measured, kMost * large.told);
   const Bake small = bakeOf(dir / "box.gltf", "512");
   ASSERT_GT(large.texels, small.texels + 5e5);
-  EXPECT_LT((large.measured - small.measured) / (large.texels - small.texels), 160.0);  // what a bake may take
+  EXPECT_LT((large.measured - small.measured) / (large.texels - small.texels),
+            175.0);  // what a bake may take, 12 of it moves of each map
 }
 
 TEST(Memory, OfTrianglesIsTold) {

@@ -85,6 +85,7 @@ Expected<void> addPage(FileSet& set, const fs::path& dir, std::size_t page, cons
   // Sample counts and coverage are exact in float only.
   options.format = PixelFormat::Float;
   options.noisy = false;
+  options.mayHoldNan = true;
   options.channelNames = auxChannels(*record.bakeOptions.encoding);
   return add("aux", baked.aux, &baked.mapErrors);
 }
