@@ -40,10 +40,10 @@ class WarmLinks::Reader {
 
   bool isTexel() const { return found_[at_] != kNoTexel; }
   /// What the texel of the link passes on; once for each link. Asks memory for what a later link will.
-  Vec3 lightOf(std::span<const PackedColor> reflected) {
+  Vec3 lightOf(std::span<const Vec3> reflected) {
     const std::uint32_t later = found_[at_ + kAhead];
     __builtin_prefetch(reflected.data() + (later != kNoTexel ? later : 0u));
-    const Vec3 light = unpackColor(reflected[found_[at_]]);
+    const Vec3 light = reflected[found_[at_]];
     return share_ != end_ && share_->link == at_ ? light * unpackWeight(share_++->weight) : light;
   }
   void next() { ++at_; }
