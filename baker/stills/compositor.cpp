@@ -49,7 +49,7 @@ Vec3 radiance(const PictureScene& scene, const ViewRay& ray, const Shading& shad
   float throughput = 1.0f;
   float tnear = 0.0f;
   for (int layer = 0; layer < kMaxLayers && throughput > 1e-3f; ++layer) {
-    const RTCRayHit query = scene.trace(ray.origin, ray.direction, tnear, kFar, false);
+    const RTCRayHit query = scene.trace(ray.origin, ray.direction, tnear, kFar, Passes::CutOutsAndBacks);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) break;
     PictureHit hit = scene.hitAt(query.hit.geomID, query.hit.primID, query.hit.u, query.hit.v);
     const Vec3 normal = glm::normalize(scene.facing(hit));
@@ -100,7 +100,7 @@ Sighting Compositor::look(const Vec3& origin, const Vec3& direction) const {
   Sighting sighting;
   float lit = 0.0f;
   sighting.radiance = lumel::radiance(*scene_, {origin, direction}, shadings().front(), {}, lit, &sighting);
-  const RTCRayHit first = scene_->trace(origin, direction, 0.0f, kFar, true);
+  const RTCRayHit first = scene_->trace(origin, direction, 0.0f, kFar, Passes::Nothing);
   if (first.hit.geomID == RTC_INVALID_GEOMETRY_ID) return sighting;
   const PictureHit hit = scene_->hitAt(first.hit.geomID, first.hit.primID, first.hit.u, first.hit.v);
   sighting.behind = scene_->showsBack(hit, direction);

@@ -21,7 +21,7 @@ T interpolate(const PictureHit& hit, const std::vector<T>& values) {
 
 struct RayContext {
   RTCIntersectContext embree;  // first: Embree hands a pointer to it to the filter
-  bool seesAll = false;        // nothing is culled or cut out
+  Passes passes = Passes::CutOutsAndBacks;
 };
 
 /// A number for each triangle's chart, counted on from `count`: triangles of a chart are joined by vertices.
@@ -147,7 +147,7 @@ Expected<void> PictureScene::buildRays() {
   return commitScene(device_.get(), rays_.get(), "scene.glb");
 }
 
-RTCRayHit PictureScene::trace(const Vec3& origin, const Vec3& direction, float tnear, float tfar, bool seesAll) const {
+RTCRayHit PictureScene::trace(const Vec3& origin, const Vec3& direction, float tnear, float tfar, Passes passes) const {
   RTCRayHit query{};
   query.ray.org_x = origin.x;
   query.ray.org_y = origin.y;
@@ -159,7 +159,7 @@ RTCRayHit PictureScene::trace(const Vec3& origin, const Vec3& direction, float t
   query.ray.tfar = tfar;
   query.ray.mask = ~0u;
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  RayContext context{{}, seesAll};
+  RayContext context{{}, passes};
   rtcInitIntersectContext(&context.embree);
   rtcIntersect1(rays_.get(), &context.embree, &query);
   return query;
@@ -185,12 +185,13 @@ Vec3 PictureScene::facing(const PictureHit& hit) const {
 /// Takes culled backs and cut-out texels out of the ray's way.
 void PictureScene::filter(const RTCFilterFunctionNArguments* arguments) {
   const PictureScene& self = *static_cast<const PictureScene*>(arguments->geometryUserPtr);
-  if (arguments->valid[0] == 0 || reinterpret_cast<const RayContext*>(arguments->context)->seesAll) return;
+  const Passes passes = reinterpret_cast<const RayContext*>(arguments->context)->passes;
+  if (arguments->valid[0] == 0 || passes == Passes::Nothing) return;
   const RTCRay& ray = *reinterpret_cast<const RTCRay*>(arguments->ray);
   const RTCHit& found = *reinterpret_cast<const RTCHit*>(arguments->hit);
   const PictureHit hit = self.hitAt(found.geomID, found.primID, found.u, found.v);
   const Material& m = *hit.shape->material;
-  if (!m.doubleSided && self.showsBack(hit, {ray.dir_x, ray.dir_y, ray.dir_z}))
+  if (passes == Passes::CutOutsAndBacks && !m.doubleSided && self.showsBack(hit, {ray.dir_x, ray.dir_y, ray.dir_z}))
     arguments->valid[0] = 0;
   else if (m.alphaMode == AlphaMode::Mask && self.baseColor(hit).w < m.alphaCutoff)
     arguments->valid[0] = 0;
@@ -202,7 +203,8 @@ bool PictureScene::sees(const Vec3& from, const Vec3& to) const {
   if (!(length > 0.0f)) return true;
   constexpr float kShort = 1.0f - 1e-4f;
   const float near = 1e-4f * (1.0f + glm::length(from)) / length;
-  return trace(from, way / length, near * length, kShort * length, false).hit.geomID == RTC_INVALID_GEOMETRY_ID;
+  return trace(from, way / length, near * length, kShort * length, Passes::CutOuts).hit.geomID ==
+         RTC_INVALID_GEOMETRY_ID;
 }
 
 Vec3 PictureScene::positionAt(const PictureHit& hit) const { return interpolate(hit, hit.shape->positions); }

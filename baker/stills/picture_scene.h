@@ -40,6 +40,13 @@ struct PictureHit {
   float width = 0.0f;  // of the part of the surface that the ray stands for, in metres; 0: a point
 };
 
+/// What lets a ray pass.
+enum class Passes {
+  Nothing,
+  CutOuts,          // rays of light: a one-sided surface blocks them from both sides, as in the bake
+  CutOutsAndBacks,  // rays of the eye: backs of one-sided surfaces are culled
+};
+
 /// The scene, its decoded textures and Embree's tree. Everything but make() may be called by many threads at once.
 class PictureScene {
  public:
@@ -52,9 +59,9 @@ class PictureScene {
   Vec3 least() const { return least_; }  // corners of the bounding box
   Vec3 most() const { return most_; }
 
-  /// The first thing on a ray between two distances; `seesAll`: nothing is culled or cut out.
-  RTCRayHit trace(const Vec3& origin, const Vec3& direction, float tnear, float tfar, bool seesAll) const;
-  /// Whether nothing lies between two points; what is culled or cut out does not count, blended surfaces do.
+  /// The first thing on a ray between two distances.
+  RTCRayHit trace(const Vec3& origin, const Vec3& direction, float tnear, float tfar, Passes passes) const;
+  /// Whether nothing lies between two points; what is cut out does not count, blended surfaces do.
   bool sees(const Vec3& from, const Vec3& to) const;
   PictureHit hitAt(unsigned geometry, unsigned triangle, float u, float v) const;
 
