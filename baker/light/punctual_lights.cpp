@@ -305,15 +305,17 @@ void PunctualLights::sample(const ReceiverLanes& at, const UnitLanes& u, const L
 
 void PunctualLights::sampleChosen(Chosen& chosen, const ReceiverLanes& at, const UnitSquareLanes* points,
                                   LightSampleLanes& samples) const {
-  for (std::size_t lane = 0; lane < kLanes; ++lane)
-    chosen.set(lane, lights_[static_cast<std::size_t>(chosen.light[lane])]);
+  static const Source none{Light{}};
+  for (std::size_t lane = 0; lane < kLanes; ++lane)  // where nothing was chosen, the number may be of no light
+    chosen.set(lane, chosen.probability[lane] > 0.0f ? lights_[static_cast<std::size_t>(chosen.light[lane])] : none);
   sampleChosen(chosen, at.p, samples);
   boundNearLight(at, samples);
   if (shapes_.empty()) return;
   LUMEL_CHECK(points != nullptr);
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (!(chosen.probability[lane] > 0.0f)) continue;
     const int shape = lights_[static_cast<std::size_t>(chosen.light[lane])].shape;
-    if (shape >= 0 && chosen.probability[lane] > 0.0f)
+    if (shape >= 0)
       sampleShape(shapes_[static_cast<std::size_t>(shape)], lane, chosen.probability[lane], at, *points, samples);
   }
 }
