@@ -37,11 +37,11 @@ inline Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const std::array<Vec3, 3>
 }
 
 /// Returns how far unit normals at a triangle's corners describe a surface that is rounded outwards over it, 0 to 1:
-/// they spread along its edges. A column of six sides (30 degrees) and a sphere of 8 x 5 are wholly round. From 35 to
-/// 44 degrees the share falls to nothing, without a step: normals that lean as those of a box with smooth edges (45)
-/// are a look and not a shape, and rays that start so far out would miss what stands over the facets.
+/// they spread along its edges. From 15 to 20 degrees of lean the share falls to nothing, without a step: normals that
+/// lean as those of an eight-sided basin (22) or of a box with smooth edges (45) are a look and not a shape, and rays
+/// that start so far out would miss what stands over the facets, such as a rim.
 inline float roundedShare(const Vec3& ng, const Vec3& e1, const Vec3& e2, const std::array<Vec3, 3>& normals) {
-  constexpr float kWholeCosine = 0.82f, kNoCosine = 0.72f;
+  constexpr float kWholeCosine = 0.966f, kNoCosine = 0.94f;
   float least = 1.0f;
   for (const Vec3& normal : normals) least = std::min(least, glm::dot(ng, normal));
   if (!(least > kNoCosine)) return 0.0f;
