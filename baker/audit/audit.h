@@ -57,9 +57,10 @@ struct AuditReport {
 /// of three: even over all texels, even over decades of the charts' brightness, and even over objects, so that neither
 /// dark rooms nor small things are missed (Hansen and Hurwitz 1943). A stratum's ratio of means has the variance of its
 /// weighed residuals. What is off by more than kAuditTolerance and three standard errors is drawn from again, four
-/// times as often and with other paths, and is called wrong if these say so too. Of a texel that is partly inside of
-/// something only the open share counts, by rays of the audit's own: a point of which every ray meets the back of a
-/// single-sided surface is inside. `objectNames`: by instance. Deterministic for any number of threads.
+/// times as often and with other paths, and is called wrong if these say so too. Texels that
+/// are hidden (validity below one half) are not judged, and neither are those with a point inside of something, by rays
+/// of the audit's own: each of that point's rays meets the back of a single-sided surface. `objectNames`: by instance.
+/// Deterministic for any number of threads.
 AuditReport audit(const LightTransport& transport, const Atlas& atlas, const std::vector<PageTexels>& texels,
                   std::span<const Image* const> flat, std::span<const Image* const> aux,
                   std::span<const std::string> objectNames, const AuditOptions& options);

@@ -15,11 +15,10 @@ namespace lumel {
 struct AuditDraw {
   std::uint32_t texel = 0;  // of the population
   std::uint32_t seed = 0;   // of its paths
-  double weight =
-      0.0;             // one over the probability to be drawn, so that weighed sums stand for all texels; 0: not judged
-  double map = 0.0;    // luminance of the finished map, of the texel's open share
-  double paths = 0.0;  // luminance by path tracing
-  Vec3 position{0};    // world
+  double weight = 0.0;      // one over the probability to be drawn, so that sums stand for all texels; 0: not judged
+  double map = 0.0;         // luminance of the finished map
+  double paths = 0.0;       // luminance by path tracing
+  Vec3 position{0};         // world
 };
 
 /// The covered texels of all pages, numbered through page by page, with their brightness and objects.

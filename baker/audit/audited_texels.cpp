@@ -14,6 +14,8 @@ namespace {
 /// Rays of which every one must meet a back for their point to be inside: beneath a cover that hides nine tenths of the
 /// sky one point in a thousand is taken to be.
 constexpr int kInsideRays = 64;
+/// Below it a texel is hidden, and the map was filled in from those around.
+constexpr float kValid = 0.5f;
 
 std::size_t pixelOf(const Image& image, TexelCoord at) {
   return (static_cast<std::size_t>(at.y) * static_cast<std::size_t>(image.width) + at.x) *
@@ -81,20 +83,16 @@ void AuditTracer::traceWave(std::span<AuditDraw* const> wave, Counts& counts) co
     TexelFootprint footprint;
     footprint.clip(atlas_, page, texels[i]);
     draw.position = footprint.centroid().position;
-    const double open = validity < 1.0f ? openShare(footprint, draw.seed, counts) : 1.0;
-    draw.map = open * static_cast<double>(luminance(Vec3(rgb[0], rgb[1], rgb[2])));
+    draw.map = static_cast<double>(luminance(Vec3(rgb[0], rgb[1], rgb[2])));
     draw.paths = static_cast<double>(luminance(traced.texels[i].sums.mean().flat));
-    if (open == 0.0) draw.paths = 0.0;
-    // Partly under something, a texel lies in two places, and its map answers for the one in view.
-    if (open > 0.0 && open < 1.0) draw.weight = 0.0;
+    if (validity < kValid || (validity < 1.0f && !liesInTheOpen(footprint, draw.seed, counts))) draw.weight = 0.0;
   }
 }
 
-double AuditTracer::openShare(const TexelFootprint& footprint, std::uint32_t seed, Counts& counts) const {
-  int open = 0;
+bool AuditTracer::liesInTheOpen(const TexelFootprint& footprint, std::uint32_t seed, Counts& counts) const {
   for (std::uint32_t i = 0; i < kPathsPerDraw; ++i)
-    open += isInside(footprint.sample(sobol2D(i, seed)), hashCombine(seed, i), counts) ? 0 : 1;
-  return static_cast<double>(open) / kPathsPerDraw;
+    if (isInside(footprint.sample(sobol2D(i, seed)), hashCombine(seed, i), counts)) return false;
+  return true;
 }
 
 bool AuditTracer::isInside(const SurfacePoint& point, std::uint32_t seed, Counts& counts) const {

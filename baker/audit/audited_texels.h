@@ -37,7 +37,8 @@ class AuditTracer {
     std::uint64_t rays = 0;
   };
   void traceWave(std::span<AuditDraw* const> wave, Counts& counts) const;
-  double openShare(const TexelFootprint& footprint, std::uint32_t seed, Counts& counts) const;
+  /// Whether no point of a texel is inside of something.
+  bool liesInTheOpen(const TexelFootprint& footprint, std::uint32_t seed, Counts& counts) const;
   bool isInside(const SurfacePoint& point, std::uint32_t seed, Counts& counts) const;
 
   const LightTransport& transport_;
