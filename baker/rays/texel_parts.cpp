@@ -29,14 +29,14 @@ constexpr float kRising = 1.0f / 64.0f;
 /// Rays that tell how far a part lies inside of something.
 constexpr int kOpennessRays = kLanes;
 
-/// Collects up to 32 questions of who sees whom and traces them sixteen at a time. A question is answered with no as
+/// Collects up to 64 questions of who sees whom and traces them sixteen at a time. A question is answered with no as
 /// soon as one of its rays is blocked.
 class SightTest {
  public:
   SightTest(const RayScene& rays, const Materials& materials) : rays_(rays), materials_(materials) {}
 
   /// Over a bend that points outwards the way leads by a point above it.
-  void ask(std::uint32_t question, const SurfaceSpot& a, const SurfaceSpot& b, float lift) {
+  void ask(std::size_t question, const SurfaceSpot& a, const SurfaceSpot& b, float lift) {
     const Vec3 from = a.p + lift * a.ng, to = b.p + lift * b.ng;
     const float cosine = glm::dot(a.ng, b.ng);
     if (cosine < kSamePlace) return;
@@ -50,64 +50,76 @@ class SightTest {
   }
 
   /// Asks whether nothing lies on the surface at a point, lower than `lift`.
-  void askUpwards(std::uint32_t question, const SurfaceSpot& spot, float lift) {
+  void askUpwards(std::size_t question, const SurfaceSpot& spot, float lift) {
     trace(question, spot.p + kRising * lift * spot.ng, spot.p + lift * spot.ng);
   }
 
   /// Bits of the questions whose two do not see each other.
-  std::uint32_t blocked() {
+  std::uint64_t blocked() {
     flush();
     return blocked_;
   }
 
  private:
-  void trace(std::uint32_t question, const Vec3& from, const Vec3& to) {
+  void trace(std::size_t question, const Vec3& from, const Vec3& to) {
     const Vec3 way = to - from;
     if (!(glm::dot(way, way) > 0.0f) || (blocked_ >> question & 1u) != 0) return;
-    packet_.set(lanes_, from, way, 1.0f);
-    questions_[static_cast<std::size_t>(lanes_)] = question;
+    from_[lanes_] = from;
+    way_[lanes_] = way;
+    questions_[lanes_] = question;
     if (++lanes_ == kLanes) flush();
   }
 
   void flush() {
     if (lanes_ == 0) return;
-    rays_.occluded(packet_, TraceMode::Packet);
-    std::uint32_t met = 0;
-    for (int lane = 0; lane < lanes_; ++lane) met |= packet_.visible(lane) ? 0u : 1u << lane;
-    if (rays_.alphaTestedParts() > 0) met = opaqueAmong(met);
-    forEachLane(met, [&](std::size_t lane) { blocked_ |= 1u << questions_[lane]; });
-    packet_.clear();
+    const std::uint32_t met = rays_.alphaTestedParts() > 0 ? metOpaque() : metAny();
+    forEachLane(met, [&](std::size_t lane) { blocked_ |= std::uint64_t{1} << questions_[lane]; });
     lanes_ = 0;
   }
 
-  /// Of the lanes that met something those that met what is neither cut out nor see-through.
-  std::uint32_t opaqueAmong(std::uint32_t met) const {
-    if (met == 0) return 0;
-    RayPacket closest;
-    forEachLane(met, [&](std::size_t l) {
-      const RTCRay16& ray = packet_.ray;
-      closest.set(static_cast<int>(l), {ray.org_x[l], ray.org_y[l], ray.org_z[l]},
-                  {ray.dir_x[l], ray.dir_y[l], ray.dir_z[l]});
-      closest.rayhit.ray.tfar[l] = 1.0f;
-    });
-    rays_.intersect(closest, TraceMode::Packet);
-    std::uint32_t opaque = 0;
-    forEachLane(met, [&](std::size_t l) {
-      const int lane = static_cast<int>(l);
-      if (!closest.hit(lane)) return;
-      const ScenePart& part = rays_.parts()[rays_.partOf(closest, lane)];
-      if (materials_.material(part.primitive->material).alphaMode == AlphaMode::Opaque) opaque |= 1u << l;
-    });
-    return opaque;
+  std::uint32_t metAny() const {
+    ShadowPacket packet;
+    for (int lane = 0; lane < static_cast<int>(lanes_); ++lane) packet.set(lane, from_[lane], way_[lane], 1.0f);
+    rays_.occluded(packet, TraceMode::Packet);
+    std::uint32_t met = 0;
+    for (int lane = 0; lane < static_cast<int>(lanes_); ++lane) met |= packet.visible(lane) ? 0u : 1u << lane;
+    return met;
+  }
+
+  /// Lanes that meet what is neither cut out nor see-through.
+  std::uint32_t metOpaque() const {
+    RayPacket packet;
+    for (int lane = 0; lane < static_cast<int>(lanes_); ++lane) {
+      packet.set(lane, from_[lane], way_[lane]);
+      packet.rayhit.ray.tfar[lane] = 1.0f;
+    }
+    rays_.intersect(packet, TraceMode::Packet);
+    std::uint32_t met = 0;
+    for (int lane = 0; lane < static_cast<int>(lanes_); ++lane) {
+      if (!packet.hit(lane)) continue;
+      const ScenePart& part = rays_.parts()[rays_.partOf(packet, lane)];
+      if (materials_.material(part.primitive->material).alphaMode == AlphaMode::Opaque) met |= 1u << lane;
+    }
+    return met;
   }
 
   const RayScene& rays_;
   const Materials& materials_;
-  ShadowPacket packet_;
-  int lanes_ = 0;
-  std::array<std::uint32_t, kLanes> questions_{};
-  std::uint32_t blocked_ = 0;
+  std::size_t lanes_ = 0;
+  std::array<Vec3, kLanes> from_;
+  std::array<Vec3, kLanes> way_;
+  std::array<std::size_t, kLanes> questions_{};
+  std::uint64_t blocked_ = 0;
 };
+
+/// Calls body(i) for the bits that are set, from the lowest.
+template <class Body>
+void forEachBit(std::uint64_t bits, Body body) {
+  for (; bits != 0; bits &= bits - 1) body(static_cast<std::size_t>(std::countr_zero(bits)));
+}
+
+/// Bits 0 to count - 1. Precondition: at most 64.
+std::uint64_t firstBits(std::size_t count) { return count == 0 ? 0 : ~std::uint64_t{0} >> (64 - count); }
 
 SurfaceSpot spotOf(const SurfacePoint& point) { return {point.position, point.geometricNormal}; }
 
@@ -178,14 +190,14 @@ constexpr std::uint32_t kNoPart = 0xffffffffu;
 
 /// Points that see each other, by way of others too, are one part: for each the number of its part's first point. From
 /// each point that was reached those are asked that were not yet, so that a whole texel takes one round.
-/// Those that something lies on are no part of anything: kNoPart. Precondition: at most 31 spots.
-std::vector<std::uint32_t> partsOf(std::span<const SurfaceSpot> spots, std::uint32_t covered, float lift,
+/// Those that something lies on are no part of anything: kNoPart. Precondition: at most 64 spots.
+std::vector<std::uint32_t> partsOf(std::span<const SurfaceSpot> spots, std::uint64_t covered, float lift,
                                    const RayScene& rays, const Materials& materials) {
   std::vector<std::uint32_t> part(spots.size(), kNoPart);
-  std::uint32_t unknown = ((1u << spots.size()) - 1u) & ~covered;
+  std::uint64_t unknown = firstBits(spots.size()) & ~covered;
   while (unknown != 0) {
     const auto first = static_cast<std::uint32_t>(std::countr_zero(unknown));
-    std::uint32_t waiting = 1u << first;
+    std::uint64_t waiting = std::uint64_t{1} << first;
     unknown &= ~waiting;
     while (waiting != 0) {
       const auto from = static_cast<std::size_t>(std::countr_zero(waiting));
@@ -193,9 +205,8 @@ std::vector<std::uint32_t> partsOf(std::span<const SurfaceSpot> spots, std::uint
       part[from] = first;
       if (unknown == 0) continue;
       SightTest sight(rays, materials);
-      for (std::uint32_t i = 0; i < spots.size(); ++i)
-        if ((unknown >> i & 1u) != 0) sight.ask(i, spots[from], spots[i], lift);
-      const std::uint32_t reached = unknown & ~sight.blocked();
+      forEachBit(unknown, [&](std::size_t i) { sight.ask(i, spots[from], spots[i], lift); });
+      const std::uint64_t reached = unknown & ~sight.blocked();
       waiting |= reached;
       unknown &= ~reached;
     }
@@ -217,7 +228,7 @@ std::uint32_t TexelParts::suspects(std::span<const std::uint32_t> texels) const 
       sight.askUpwards(i, {corner.p + kFromCorner * (middle.p - corner.p), corner.ng}, lift);
     }
   }
-  return sight.blocked();
+  return static_cast<std::uint32_t>(sight.blocked());
 }
 
 std::optional<TexelPart> TexelParts::find(std::size_t texel) const {
@@ -231,7 +242,7 @@ std::optional<TexelPart> TexelParts::find(std::size_t texel) const {
 
   const std::size_t count = spots.size();
   SightTest upwards(rays_, materials_);
-  for (std::size_t i = corners; i < count; ++i) upwards.askUpwards(static_cast<std::uint32_t>(i), spots[i], lift);
+  for (std::size_t i = corners; i < count; ++i) upwards.askUpwards(i, spots[i], lift);
   const std::vector<std::uint32_t> parent = partsOf(spots, upwards.blocked(), lift, rays_, materials_);
   if (std::ranges::count(parent, 0u) == static_cast<std::ptrdiff_t>(count)) return std::nullopt;
 
@@ -268,15 +279,14 @@ std::optional<TexelPart> TexelParts::find(std::size_t texel) const {
   return best->part;
 }
 
-std::uint32_t TexelParts::members(const TexelPart& part, std::span<const SurfaceSpot> spots) const {
+std::uint64_t TexelParts::members(const TexelPart& part, std::span<const SurfaceSpot> spots) const {
   SightTest upwards(rays_, materials_);
-  for (std::uint32_t i = 0; i < spots.size(); ++i) upwards.askUpwards(i, spots[i], part.lift);
-  const std::uint32_t free = ((1u << spots.size()) - 1u) & ~upwards.blocked();
-  std::uint32_t others = free;
+  for (std::size_t i = 0; i < spots.size(); ++i) upwards.askUpwards(i, spots[i], part.lift);
+  const std::uint64_t free = firstBits(spots.size()) & ~upwards.blocked();
+  std::uint64_t others = free;
   for (std::size_t k = 0; k < part.count && others != 0; ++k) {
     SightTest sight(rays_, materials_);
-    forEachLane(others,
-                [&](std::size_t i) { sight.ask(static_cast<std::uint32_t>(i), part.spots[k], spots[i], part.lift); });
+    forEachBit(others, [&](std::size_t i) { sight.ask(i, part.spots[k], spots[i], part.lift); });
     others &= sight.blocked();
   }
   return free & ~others;
@@ -287,13 +297,9 @@ std::optional<PartPoints> TexelParts::pointsOf(std::size_t texel, std::uint32_t 
   if (!part) return std::nullopt;
   TexelFootprint footprint;
   footprint.clip(atlas_, page_, texel);
-  PartPoints points;
-  for (std::uint32_t first = 0; first < PartPoints::kDrawn; first += kLanes) {
-    std::array<SurfaceSpot, kLanes> spots;
-    for (std::uint32_t i = 0; i < kLanes; ++i) spots[i] = spotOf(footprint.sample(sobol2D(first + i, seed)));
-    const std::uint32_t seen = members(*part, spots);
-    points.bits |= std::uint64_t{seen} << first;
-  }
+  std::array<SurfaceSpot, PartPoints::kDrawn> spots;
+  for (std::uint32_t i = 0; i < PartPoints::kDrawn; ++i) spots[i] = spotOf(footprint.sample(sobol2D(i, seed)));
+  const PartPoints points{members(*part, spots)};
   if (points.bits == 0) return std::nullopt;
   return points;
 }
@@ -344,7 +350,7 @@ void TexelParts::findOpen(std::span<const std::uint8_t> asked, std::span<const s
         if (!beside[k] || (reached[*beside[k]] != 0 && open[*beside[k]] == 0)) continue;
         sight.ask(k, from.spot, standAt(static_cast<std::uint32_t>(*beside[k])).spot, from.lift);
       }
-      const std::uint32_t blocked = sight.blocked();
+      const std::uint64_t blocked = sight.blocked();
       for (std::uint32_t k = 0; k < kBeside.size(); ++k) {
         if (!beside[k] || (blocked >> k & 1u) != 0) continue;
         const auto texel = static_cast<std::uint32_t>(*beside[k]);

@@ -61,8 +61,8 @@ class TexelParts {
   /// of the neighbouring texels of its chart, and among these the largest; parts inside of solids come last.
   std::optional<TexelPart> find(std::size_t texel) const;
 
-  /// Bit i: spots[i] sees the part. Precondition: at most kLanes spots.
-  std::uint32_t members(const TexelPart& part, std::span<const SurfaceSpot> spots) const;
+  /// Bit i: spots[i] sees the part. Precondition: at most 64 spots.
+  std::uint64_t members(const TexelPart& part, std::span<const SurfaceSpot> spots) const;
 
   /// The points of a texel that is divided; nothing where it is whole, or where none of them counts.
   std::optional<PartPoints> pointsOf(std::size_t texel, std::uint32_t seed) const;

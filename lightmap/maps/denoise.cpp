@@ -420,7 +420,8 @@ void storeErrors(const Tile& tile, const Sums& sums, std::size_t own, std::size_
   const float weight = sums.weight[i];
   const float left = sums.variance[i] / (weight * weight);
   // The texels differ by their noise in the other maps as they do in the flat one.
-  const float share = tile.stated[own] > 0.0f ? left / tile.stated[own] : 1.0f;
+  // Averaging adds none, whatever noisier texels beside one that states next to nothing say.
+  const float share = tile.stated[own] > left ? left / tile.stated[own] : 1.0f;
   for (std::size_t m = 0; m < tile.maps(); ++m) {
     float& error = to.errors[m][pixel];
     if (!std::isfinite(error)) continue;
