@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "baker/path/texel_sums.h"
 #include "baker/rays/flush_denormals.h"
 #include "baker/rays/sampling.h"
 #include "scene/base/parallel.h"
@@ -14,8 +15,6 @@ namespace {
 /// Rays of which every one must meet a back for their point to be inside: beneath a cover that hides nine tenths of the
 /// sky one point in a thousand is taken to be.
 constexpr int kInsideRays = 64;
-/// Below it a texel is hidden, and the map was filled in from those around.
-constexpr float kValid = 0.5f;
 
 std::size_t pixelOf(const Image& image, TexelCoord at) {
   return (static_cast<std::size_t>(at.y) * static_cast<std::size_t>(image.width) + at.x) *
@@ -85,7 +84,8 @@ void AuditTracer::traceWave(std::span<AuditDraw* const> wave, Counts& counts) co
     draw.position = footprint.centroid().position;
     draw.map = static_cast<double>(luminance(Vec3(rgb[0], rgb[1], rgb[2])));
     draw.paths = static_cast<double>(luminance(traced.texels[i].sums.mean().flat));
-    if (validity < kValid || (validity < 1.0f && !liesInTheOpen(footprint, draw.seed, counts))) draw.weight = 0.0;
+    if (validity < kLeastValidity || (validity < 1.0f && !liesInTheOpen(footprint, draw.seed, counts)))
+      draw.weight = 0.0;
   }
 }
 

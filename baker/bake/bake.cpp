@@ -14,6 +14,7 @@
 #include "baker/gather/waves/waves.h"
 #include "baker/light/lit_scene.h"
 #include "baker/path/path_integrator.h"
+#include "baker/path/texel_sums.h"
 #include "baker/rays/flush_denormals.h"
 #include "baker/rays/texel_parts.h"
 #include "scene/base/check.h"
@@ -49,7 +50,7 @@ void storeAux(Image& aux, TexelCoord at, const BakedTexel& texel, const Encoding
   pixel[1] = texel.validity;
   pixel[2] = texel.standardError;
   pixel[3] = static_cast<float>(texel.samples);
-  if (texel.validity < 0.5f) return;
+  if (texel.validity < kLeastValidity) return;
   ++stats.validTexels;
   stats.luminance += static_cast<double>(luminance(stored.flat));
   if (!texel.probed) return;
@@ -421,7 +422,7 @@ std::vector<MapErrorFigure> statedErrors(std::span<const BakedPage> pages, const
   for (const BakedPage& page : pages)
     for (std::size_t i = 0; i < page.aux.pixels.size() / 4; ++i) {
       const float* aux = page.aux.pixels.data() + 4 * i;
-      if (!(aux[0] > 0.0f) || aux[1] < 0.5f) continue;
+      if (!(aux[0] > 0.0f) || aux[1] < kLeastValidity) continue;
       for (std::size_t m = 0; m < figures.size(); ++m) {
         const float error = m == 0 ? aux[2] : page.mapErrors.pixels[i * encoding.mapCount() + m - 1];
         if (!std::isfinite(error)) continue;

@@ -6,6 +6,7 @@
 #include <limits>
 #include <span>
 
+#include "baker/path/texel_sums.h"
 #include "lightmap/maps/denoise.h"
 #include "lightmap/maps/dilate.h"
 #include "scene/base/parallel.h"
@@ -13,7 +14,6 @@
 namespace lumel {
 namespace {
 
-constexpr float kLeastValidity = 0.5f;
 constexpr std::size_t kTexelsPerTask = 1024;
 
 /// What is known of a page's texels, row by row.

@@ -8,6 +8,7 @@
 #include "baker/gather/waves/waves.h"
 #include "baker/light/direct_light.h"
 #include "baker/light/lit_scene.h"
+#include "baker/path/texel_sums.h"
 #include "baker/rays/flush_denormals.h"
 #include "baker/rays/texel_parts.h"
 #include "lightmap/maps/dilate.h"
@@ -17,7 +18,6 @@
 namespace lumel {
 namespace {
 
-constexpr float kLeastValidity = 0.5f;
 /// Keeps the patterns apart from those of the bake.
 constexpr std::uint64_t kMaskSeed = 0x6d61736bull << 32;
 constexpr std::uint32_t kMaskFootprint = 0x1000u;

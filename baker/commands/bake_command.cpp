@@ -20,6 +20,7 @@
 #include "lightmap/texels/texels.h"
 #include "scene/base/parallel.h"
 #include "scene/base/process_memory.h"
+#include "scene/base/split_text.h"
 #include "scene/files/file_set.h"
 
 namespace lumel {
@@ -145,10 +146,7 @@ Expected<void> keepObjects(const std::string& list, Scene& scene) {
                : name == pattern;
   };
   std::vector<bool> wanted(scene.instances.size(), false);
-  for (std::size_t first = 0; first <= list.size();) {
-    const std::size_t comma = std::min(list.find(',', first), list.size());
-    const std::string pattern = list.substr(first, comma - first);
-    first = comma + 1;
+  for (const std::string& pattern : splitText(list, ',')) {
     bool found = false;
     for (std::size_t i = 0; i < scene.instances.size(); ++i) {
       if (!matches(pattern, scene.instances[i].name)) continue;

@@ -14,6 +14,7 @@
 #include "baker/stills/tone_map.h"
 #include "baker/stills/viewpoint.h"
 #include "scene/base/parallel.h"
+#include "scene/base/split_text.h"
 #include "scene/files/file_access.h"
 #include "scene/files/file_set.h"
 #include "scene/images/image_io.h"
@@ -82,16 +83,13 @@ void declareOptions(OptionTable& options, RenderArguments& a) {
 
 Expected<std::vector<const Shading*>> modesOf(const RenderArguments& a) {
   std::vector<const Shading*> modes;
-  for (std::size_t at = 0; at <= a.modes.size();) {
-    const std::size_t end = std::min(a.modes.find(',', at), a.modes.size());
-    const std::string name = a.modes.substr(at, end - at);
+  for (const std::string& name : splitText(a.modes, ',')) {
     modes.push_back(findShading(name));
     if (!modes.back()) {
       std::string known;
       for (const Shading& shading : shadings()) known += (known.empty() ? "" : ", ") + std::string(shading.name);
       return usageError("--mode: '" + name + "' is not one of " + known);
     }
-    at = end + 1;
   }
   return modes;
 }
@@ -168,14 +166,6 @@ std::string describe(const Camera& camera) {
   return text;
 }
 
-/// The unit that a legend names.
-std::string unitOf(const Shading& shading) {
-  if (shading.name == "density") return "texels per m";
-  if (shading.name == "error") return "%";
-  if (shading.name == "samples") return "rays";
-  return "";
-}
-
 /// The still as an 8-bit picture shows it, sRGB-encoded.
 Image pictureOf(const Still& still, const Shading& shading, float exposure, ToneMap curve) {
   switch (shading.shown) {
@@ -184,7 +174,7 @@ Image pictureOf(const Still& still, const Shading& shading, float exposure, Tone
     case Shown::Color:
       return toneMap(still.radiance, 0.0f, ToneMap::Linear);
     case Shown::Number:
-      return numberPicture(still, unitOf(shading));
+      return numberPicture(still, std::string(shading.unit));
     case Shown::Data:
       break;
   }

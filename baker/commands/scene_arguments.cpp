@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "baker/bake/lit_sides.h"
+#include "scene/base/split_text.h"
 #include "scene/images/environment.h"
 #include "scene/images/image_io.h"
 #include "scene/load/load_scene.h"
@@ -32,14 +33,12 @@ void declareSsbump(OptionTable& options, SceneArguments& a) {
 /// Errors: Usage.
 static Expected<LoadOptions> loadOptionsOf(const SceneArguments& a) {
   LoadOptions options{.allowOutsidePaths = a.allowOutsidePaths, .lightUnits = a.lightUnits};
-  for (std::size_t at = 0; at < a.ssbump.size();) {
-    const std::size_t end = std::min(a.ssbump.find(',', at), a.ssbump.size());
-    const std::string pair = a.ssbump.substr(at, end - at);
+  if (a.ssbump.empty()) return options;
+  for (const std::string& pair : splitText(a.ssbump, ',')) {
     const std::size_t equals = pair.find('=');
     if (equals == std::string::npos || equals == 0 || equals + 1 == pair.size())
       return usageError("--ssbump: '" + pair + "' is not of the form MATERIAL=FILE");
     options.ssbump.emplace_back(pair.substr(0, equals), pair.substr(equals + 1));
-    at = end + 1;
   }
   return options;
 }

@@ -9,6 +9,9 @@
 
 namespace lumel {
 
+/// Texels of less validity are hidden: inside of things, beneath floors. They take the light of texels around them.
+constexpr float kLeastValidity = 0.5f;
+
 /// Holds the light of one sample, spread over the flat map and those of an encoding: estimates of irradiance / pi.
 struct SampleValue {
   Vec3 flat{0};

@@ -4,18 +4,10 @@
 #include <charconv>
 #include <cmath>
 
+#include "scene/base/split_text.h"
+
 namespace lumel {
 namespace {
-
-std::vector<std::string> split(const std::string& text, char separator) {
-  std::vector<std::string> parts;
-  for (std::size_t at = 0; at <= text.size();) {
-    const std::size_t end = std::min(text.find(separator, at), text.size());
-    parts.push_back(text.substr(at, end - at));
-    at = end + 1;
-  }
-  return parts;
-}
 
 bool readNumber(const std::string& text, float& number) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -23,7 +15,7 @@ bool readNumber(const std::string& text, float& number) {
 }
 
 bool readVector(const std::string& text, Vec3& vector) {
-  const auto parts = split(text, ',');
+  const auto parts = splitText(text, ',');
   return parts.size() == 3 && readNumber(parts[0], vector.x) && readNumber(parts[1], vector.y) &&
          readNumber(parts[2], vector.z);
 }
@@ -86,9 +78,9 @@ class LampParts {
 Expected<std::vector<Light>> parseLamps(const std::string& text, const Camera& camera) {
   std::vector<Light> lamps;
   if (text.empty()) return lamps;
-  for (const std::string& one : split(text, ';')) {
+  for (const std::string& one : splitText(text, ';')) {
     Light lamp;
-    if (!LampParts(split(one, ':'), camera).read(lamp))
+    if (!LampParts(splitText(one, ':'), camera).read(lamp))
       return usageError("--light: '" + one +
                         "' is none of point:X,Y,Z:CANDELA, spot:X,Y,Z:DX,DY,DZ:CANDELA:DEGREES, "
                         "spot:camera:CANDELA:DEGREES, sun:DX,DY,DZ:LUX (each may end in :R,G,B)");

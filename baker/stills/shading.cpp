@@ -154,11 +154,11 @@ constexpr Shading kShadings[] = {
     {"checker", "the texels of the lightmap as squares", Shown::Color, false, shadeChecker},
     {"chart", "a colour for each chart", Shown::Color, false, shadeChart},
     {"page", "a colour for each page", Shown::Color, false, shadePage},
-    {"density", "texels per metre", Shown::Number, false, shadeDensity},
+    {"density", "texels per metre", Shown::Number, false, shadeDensity, "texels per m"},
     {"coverage", "the share of a texel that is covered", Shown::Number, false, shadeCoverage},
     {"validity", "the share of rays that met no back of a surface", Shown::Number, false, shadeValidity},
-    {"error", "standard error of the light in per cent", Shown::Number, false, shadeError},
-    {"samples", "gather rays per texel", Shown::Number, false, shadeSamples},
+    {"error", "standard error of the light in per cent", Shown::Number, false, shadeError, "%"},
+    {"samples", "gather rays per texel", Shown::Number, false, shadeSamples, "rays"},
 };
 
 }  // namespace

@@ -60,6 +60,7 @@ struct Shading {
   Shown shown;
   bool hasSky;  // whether the sky is seen behind the surfaces
   Vec3 (*shade)(const SeenPoint& point);
+  std::string_view unit = "";  // of numbers, as their legend names it
 };
 
 /// All of them; the first is the one that is used unless told otherwise.
