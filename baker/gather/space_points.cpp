@@ -13,27 +13,28 @@
 namespace lumel {
 namespace {
 
-constexpr float kY0 = 0.28209479f;  // 1 / (2 sqrt(pi))
-constexpr float kY1 = 0.48860251f;  // sqrt(3 / (4 pi))
 constexpr float kSphere = 4.0f * kPi;
 /// Takes the place of a page in sampler seeds, so that points have patterns of their own.
 constexpr std::uint32_t kSpacePage = 0xffffffffu;
 
-std::array<float, 4> harmonics(const Vec3& w) { return {kY0, kY1 * w.y, kY1 * w.z, kY1 * w.x}; }
-
 /// Sums what rays and light samples of a wave of points find.
 struct SpaceSink {
   const SurfaceCache& surfaces;
-  std::array<std::array<Vec3d, 4>, kLanes> sums{};
+  bool indirectOnly = false;
+  std::array<std::array<Vec3d, kHarmonics>, kLanes> sums{};
+  std::array<std::array<Vec3d, kCubeFaces>, kLanes> cubes{};
   std::array<std::uint32_t, kLanes> backs{};
 
   void add(std::size_t lane, const Vec3& direction, const Vec3& light) {
     if (!isFinite(light)) return;
-    const std::array<float, 4> y = harmonics(direction);
+    const std::array<float, kHarmonics> y = harmonics(direction);
     for (std::size_t k = 0; k < y.size(); ++k) sums[lane][k] += Vec3d(light * y[k]);
+    const std::array<float, kCubeFaces> faces = cubeKernels(direction);
+    for (std::size_t k = 0; k < faces.size(); ++k) cubes[lane][k] += Vec3d(light * faces[k]);
   }
   // What GatherTracer asks of a sink; Flight::dirTangent is in world space here.
-  void light(const Flight& flight, const Vec3& radiance, int) {
+  void light(const Flight& flight, const Vec3& radiance, int depth) {
+    if (indirectOnly && depth == 0) return;
     add(flight.lane, flight.dirTangent, flight.beta * radiance);
   }
   void texel(const Flight& flight, std::uint32_t texel) {
@@ -50,7 +51,7 @@ struct SpaceSink {
 /// Up to kLanes points.
 void gatherWave(const LightTransport& transport, const SurfaceCache& surfaces, std::span<const Vec3> points,
                 std::uint32_t firstPoint, const SpaceOptions& options, std::span<SpaceLight> found) {
-  SpaceSink sink{surfaces};
+  SpaceSink sink{surfaces, options.indirectOnly};
   GatherTracer tracer(transport, surfaces.map, surfaces.reflectance, surfaces.lastDepth,
                       punctualChoice(transport.punctual, {}, {}), sink);
   LaneFlags active{};
@@ -70,9 +71,10 @@ void gatherWave(const LightTransport& transport, const SurfaceCache& surfaces, s
   const auto count = static_cast<std::uint32_t>(std::max(1, options.samples));
   for (std::uint32_t s = 0; s < count; ++s) {
     samples.setSampleOfAll(s);
-    directLight(
-        straight, receivers, samples, 0, TraceMode::Packet, kSphereDensity,
-        [&](int lane, const Vec3& wi, const Vec3& light) { sink.add(static_cast<std::size_t>(lane), wi, light); });
+    if (!options.indirectOnly)
+      directLight(
+          straight, receivers, samples, 0, TraceMode::Packet, kSphereDensity,
+          [&](int lane, const Vec3& wi, const Vec3& light) { sink.add(static_cast<std::size_t>(lane), wi, light); });
     const UnitSquareLanes u = samples.draw2D(kDirection);
     packet.clear();
     for (std::size_t lane = 0; lane < points.size(); ++lane)
@@ -93,7 +95,10 @@ void gatherWave(const LightTransport& transport, const SurfaceCache& surfaces, s
   }
   tracer.finish();
   for (std::size_t lane = 0; lane < points.size(); ++lane) {
-    for (std::size_t k = 0; k < 4; ++k) found[lane].sh[k] = Vec3(sink.sums[lane][k] / static_cast<double>(count));
+    for (std::size_t k = 0; k < kHarmonics; ++k)
+      found[lane].sh[k] = Vec3(sink.sums[lane][k] / static_cast<double>(count));
+    for (std::size_t k = 0; k < kCubeFaces; ++k)
+      found[lane].cube[k] = Vec3(sink.cubes[lane][k] / static_cast<double>(count));
     found[lane].backFaces = static_cast<float>(sink.backs[lane]) / static_cast<float>(count);
   }
 }

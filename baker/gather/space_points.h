@@ -8,6 +8,7 @@
 
 #include "baker/gather/surface_cache.h"
 #include "baker/light/light_transport.h"
+#include "lightmap/volume/light_volume.h"
 #include "scene/base/expected.h"
 #include "scene/base/progress.h"
 
@@ -15,9 +16,11 @@ namespace lumel {
 
 /// The light that arrives at a point.
 struct SpaceLight {
-  /// Integral over the sphere of radiance times the real spherical harmonics Y_00, Y_1-1 (y), Y_10 (z) and Y_11 (x) of
-  /// the direction that it comes from, in world space (Ramamoorthi and Hanrahan 2001); red, green, blue.
-  std::array<Vec3, 4> sh{};
+  /// Integral over the sphere of radiance times harmonics() of the direction that it comes from, in world space; red,
+  /// green, blue.
+  std::array<Vec3, kHarmonics> sh{};
+  /// The same times cubeKernels(): irradiance / pi on the faces of a cube.
+  std::array<Vec3, kCubeFaces> cube{};
   /// Share of the rays that met the back of a single-sided surface, 0..1: near 1 inside of solids.
   float backFaces = 0.0f;
 
@@ -30,6 +33,7 @@ struct SpaceLight {
 struct SpaceOptions {
   int samples = 256;  // rays per point, and light samples of each kind of light
   std::uint64_t seed = 1;
+  bool indirectOnly = false;  // without what arrives straight from lights, shining surfaces and the sky
 };
 
 /// Gathers the light at points in world space: lights are sampled at them, and rays find what `surfaces` knows of the
