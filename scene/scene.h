@@ -12,6 +12,7 @@
 #include "scene/base/math.h"
 #include "scene/image.h"
 #include "scene/light.h"
+#include "scene/volume.h"
 
 namespace lumel {
 
@@ -168,6 +169,7 @@ struct Scene {
   std::vector<ImageSource> images;
   std::vector<Light> lights;
   std::vector<Camera> cameras;
+  std::vector<VolumeBox> volumes;
   Environment environment;  // set by the command line, not by the file
   LoadReport report;
 

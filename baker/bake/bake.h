@@ -14,6 +14,7 @@
 #include "lightmap/seams/seams.h"
 #include "lightmap/surface.h"
 #include "lightmap/texels/texels.h"
+#include "lightmap/volume/light_volume.h"
 #include "scene/base/expected.h"
 #include "scene/base/progress.h"
 #include "scene/image.h"
@@ -66,6 +67,7 @@ struct BakeResult {
   BakeStats stats;
   std::optional<AuditReport> audit;  // auditBake
   std::vector<Image> shadowMasks;    // RGBA, by page: bakeShadowMasks; empty: not asked for
+  std::vector<LightVolume> volumes;  // bakeVolumes
 };
 
 class LitScene;

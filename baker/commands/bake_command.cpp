@@ -6,11 +6,14 @@
 
 #include "baker/bake/bake.h"
 #include "baker/bake/finish.h"
+#include "baker/bake/gather_session.h"
+#include "baker/bake/light_volumes.h"
 #include "baker/bake/quality.h"
 #include "baker/bake/shadow_masks.h"
 #include "baker/commands/command.h"
 #include "baker/commands/scene_arguments.h"
 #include "baker/commands/stage_clock.h"
+#include "baker/commands/volume_arguments.h"
 #include "baker/files/names/file_names.h"
 #include "baker/files/read/earlier_layout.h"
 #include "baker/files/write/bake_files.h"
@@ -50,6 +53,7 @@ struct BakeArguments : SceneArguments {
   bool half = false;
   bool flatten = false;
   bool shadowMasks = false;
+  VolumeArguments volumes;
   bool strict = false;
   int threads = 0;
   Quality quality = Quality::Production;
@@ -132,6 +136,7 @@ void declareOptions(OptionTable& options, BakeArguments& a) {
             "bounce light [all]")
       .placeholder = "NAME,...";
   declareLightOptions(options, a);
+  declareVolumes(options, a.volumes);
   options.group("General");
   options.flag("strict", a.strict, "Exit with 4 if there was any warning; the result is written all the same");
   options.integer("threads", a.threads, {0, 1024}, "Threads to use, without influence on the result; 0: one per core");
@@ -353,6 +358,10 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   if (auto kept = keepObjects(a.objects, *scene); !kept) return kept.error();
   if (a.half) warnOfHalf(*scene);
   if (auto checked = checkShadowMasks(a, *scene); !checked) return checked;
+  auto volumes = volumesOf(a.volumes, *scene);
+  if (!volumes) return volumes.error();
+  if (!volumes->empty() && a.bake.integrator != Integrator::Gather)
+    return usageError("--volume: light volumes are gathered from the surfaces of a gather; take --integrator gather");
   if (!context.quiet) printSettings(record.settings);
   if (!context.quiet) printNotes(scene->report.notes);
   if (!context.quiet) printWarnings(scene->report.warnings);
@@ -379,8 +388,18 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   clock.start("bake");
   auto lit = LitScene::build(*scene, record.bakeOptions.bounces != 0);
   if (!lit) return lit.error();
-  auto baked = bake(**lit, atlas->atlas, texels, record.bakeOptions, progress);
+  GatherSession session;
+  session.keepsSurfaces = !volumes->empty();
+  auto baked = bake(**lit, atlas->atlas, texels, record.bakeOptions, progress, &session);
   if (!baked) return baked.error();
+  if (session.surfaces) {
+    clock.start("volumes");
+    const VolumeOptions options{.samples = a.volumes.samples, .indirectOnly = a.bake.indirectOnly, .seed = a.bake.seed};
+    if (auto done = bakeVolumes((*lit)->transport(), *session.surfaces, *volumes, options, progress); !done)
+      return done;
+    baked->volumes = *std::move(volumes);
+    session.surfaces.reset();
+  }
   clock.start("finish");
   baked->stats.seams = finishPages(baked->pages, atlas->atlas, texels,
                                    {.denoise = denoises(a),

@@ -196,6 +196,21 @@ Option& OptionTable::vector(const std::string& name, std::optional<Vec3>& target
   return add(std::move(o));
 }
 
+Option& OptionTable::box(const std::string& name, std::optional<std::array<Vec3, 2>>& target, const std::string& help) {
+  Option o{.name = name, .placeholder = "X0 Y0 Z0 X1 Y1 Z1", .help = help, .values = 6};
+  o.set = [&target](Texts texts) -> Problem {
+    std::array<Vec3, 2> corners{};
+    for (std::size_t i = 0; i < 2; ++i)
+      if (auto problem = parseColor(texts.subspan(3 * i, 3), {}, corners[i])) return problem;
+    target = corners;
+    return {};
+  };
+  o.value = [&target] {
+    return target ? nlohmann::ordered_json{toJson((*target)[0]), toJson((*target)[1])} : nlohmann::ordered_json();
+  };
+  return add(std::move(o));
+}
+
 Option& OptionTable::text(const std::string& name, std::string& target, const std::string& help) {
   Option o{.name = name, .placeholder = "TEXT", .help = help, .defaultText = target};
   o.set = [&target](Texts texts) -> Problem {

@@ -2,6 +2,7 @@
 // both read it, so that a name, a check, a default and a help text exist once.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <filesystem>
@@ -63,6 +64,8 @@ class OptionTable {
                          const std::string& help);
   Option& color(const std::string& name, Vec3& target, Range<float> range, const std::string& help);
   Option& vector(const std::string& name, std::optional<Vec3>& target, const std::string& help);
+  /// Two corners of a box; empty unless given.
+  Option& box(const std::string& name, std::optional<std::array<Vec3, 2>>& target, const std::string& help);
   Option& text(const std::string& name, std::string& target, const std::string& help);
   Option& path(const std::string& name, std::filesystem::path& target, const std::string& help);
   Option& positionalPath(const std::string& name, std::filesystem::path& target, const std::string& help);

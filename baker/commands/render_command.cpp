@@ -10,6 +10,7 @@
 #include "baker/files/names/version.h"
 #include "baker/stills/compositor.h"
 #include "baker/stills/lamps.h"
+#include "baker/stills/placed_object.h"
 #include "baker/stills/sheet.h"
 #include "baker/stills/tone_map.h"
 #include "baker/stills/viewpoint.h"
@@ -18,6 +19,7 @@
 #include "scene/files/file_access.h"
 #include "scene/files/file_set.h"
 #include "scene/images/image_io.h"
+#include "scene/load/load_scene.h"
 
 namespace lumel {
 namespace {
@@ -39,6 +41,8 @@ struct RenderArguments {
   int samplesPerPixel = 16;
   std::string modes = std::string(shadings().front().name);  // separated by commas
   std::string lamps;
+  fs::path object;
+  std::optional<Vec3> at;
   std::optional<float> exposure;
   ToneMap toneMap = ToneMap::Aces;
   int threads = 0;
@@ -65,6 +69,12 @@ void declareOptions(OptionTable& options, RenderArguments& a) {
             "may end in :R,G,B")
       .placeholder = "LIGHT;...";
   options.find("light")->defaultText = "none";
+  options
+      .path("object", a.object,
+            "Model to put into the picture, lit by the bake's light volume where it stands, else by the mean light")
+      .placeholder = "FILE";
+  options.find("object")->defaultText = "none";
+  options.vector("at", a.at, "Where the model's origin stands, in the scene's metres [0 0 0]");
   options
       .optionalNumber("exposure", a.exposure, {-64.0f, 64.0f}, "Stops of exposure for PNG; 0 shows radiance 1 as white")
       .defaultText = "by the picture's brightness";
@@ -104,6 +114,7 @@ Expected<void> check(const RenderArguments& a) {
     return usageError("--mode: several modes make a sheet, which is a .png; give one for .exr");
   if (extension == ".exr" && a.exposure)
     return usageError("--exposure: .exr pictures are linear and unexposed; give .png");
+  if (a.at && a.object.empty()) return usageError("--at needs --object");
   if (a.lookAt && !a.position) return usageError("--look-at needs --camera-position");
   if (a.position && a.lookAt && *a.position == *a.lookAt)
     return usageError("--look-at: the same point as --camera-position; it has no direction");
@@ -214,8 +225,13 @@ Expected<void> runRender(const RenderArguments& a, CommandContext& context) {
   if (auto checked = checkOutput(a); !checked) return checked;
   const ThreadLimit limit(a.threads);
   const std::vector<const Shading*> modes = *modesOf(a);
-  const auto baked = readBake(a.bake, {.flat = true, .aux = true});
+  auto baked = readBake(a.bake, {.flat = true, .aux = true, .volumes = true});
   if (!baked) return baked.error();
+  if (!a.object.empty()) {
+    const auto object = loadScene(a.object);
+    if (!object) return object.error();
+    placeObject(baked->scene, *object, a.at.value_or(Vec3(0.0f)));
+  }
   const auto compositor = Compositor::make(*baked);
   if (!compositor) return compositor.error();
   if (!context.quiet)

@@ -48,21 +48,31 @@ bool SeenHit::hasRnm() const { return scene_.baked().encoding->name() == "rnm"; 
 
 Vec3 SeenHit::lookup(const Image& image) const { return Bilinear(image, lightmapUv())(image); }
 
+/// The light on a unit normal in the world, of the first light volume around the point; without one the bake's mean.
+Vec3 SeenHit::around(const Vec3& normal) const {
+  const BakedScene& baked = scene_.baked();
+  const Vec3 position = scene_.positionAt(hit_);
+  for (const LightVolume& volume : baked.volumes)
+    if (volume.contains(position))
+      return lightOn(volume, lookUp(volume, position, frame().n, VolumeMask::Sight), normal, VolumeBasis::Sh2);
+  return baked.meanFlat;
+}
+
 Vec3 SeenHit::map(std::size_t index) const {
   const BakedScene& baked = scene_.baked();
-  if (page() < 0) return baked.meanFlat;
+  if (page() < 0) return around(frame().n);
   const std::vector<Image>& maps = baked.pages[toSize(page())];
   return index < maps.size() ? lookup(maps[index]) : Vec3(0.0f);
 }
 
 Vec3 SeenHit::flat() const {
   const BakedScene& baked = scene_.baked();
-  return page() < 0 ? baked.meanFlat : lookup(baked.flat[toSize(page())]);
+  return page() < 0 ? around(frame().n) : lookup(baked.flat[toSize(page())]);
 }
 
 Vec3 SeenHit::decoded(const Vec3& normalTangent) const {
   const BakedScene& baked = scene_.baked();
-  if (page() < 0) return baked.meanFlat;
+  if (page() < 0) return around(frame().fromLocal(normalTangent));
   const std::vector<Image>& maps = baked.pages[toSize(page())];
   const Bilinear at(maps[0], lightmapUv());
   std::array<Vec3, kMostMaps> values;

@@ -40,6 +40,7 @@ class SeenHit : public SeenPoint {
  private:
   Vec2 lightmapUv() const { return hit_.shape->lightmap.apply(scene_.uvAt(hit_, 1)); }
   Vec3 lookup(const Image& image) const;
+  Vec3 around(const Vec3& normal) const;
 
   const PictureScene& scene_;
   const PictureHit& hit_;

@@ -92,6 +92,14 @@ Vec3 LightVolume::gridPoint(std::size_t index) const {
   return origin + at * cell;
 }
 
+bool LightVolume::contains(const Vec3& p) const {
+  for (int axis = 0; axis < 3; ++axis) {
+    const float most = origin[axis] + cell[axis] * static_cast<float>(counts[static_cast<std::size_t>(axis)] - 1);
+    if (!(p[axis] >= origin[axis] && p[axis] <= most)) return false;
+  }
+  return true;
+}
+
 double pointCount(const Vec3& least, const Vec3& most, float cell) {
   double count = 1.0;
   for (int axis = 0; axis < 3; ++axis)

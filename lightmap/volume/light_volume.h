@@ -63,6 +63,8 @@ struct LightVolume {
            static_cast<std::size_t>(x);
   }
   Vec3 gridPoint(std::size_t index) const;
+  /// Whether a place in the world lies in the box of the points.
+  bool contains(const Vec3& p) const;
 };
 
 /// Grid of points that fills a box with cells of at most `cell` metres; a flat box has one layer. Without light.

@@ -139,8 +139,8 @@ std::optional<std::string> readObjectSettings(const tinygltf::Value& extras, Obj
       const std::optional<bool> truth = truthOf(value);
       if (!truth) return key + " must be true or false";
       (key == "casts" ? settings.casts : settings.receives) = *truth;
-    } else if (key != "page" && key != "light") {
-      return "'" + key + "' is not known; use scale, casts, receives or light";
+    } else if (key != "page" && key != "light" && key != "volume") {
+      return "'" + key + "' is not known; use scale, casts, receives, light or volume";
     }
   }
   return std::nullopt;
@@ -168,6 +168,28 @@ std::optional<std::string> readLightSettings(const tinygltf::Value& extras, Ligh
   for (const std::string& key : light.Keys())
     if (auto problem = readLightSetting(key, light.Get(key), settings)) return problem;
   isSet = true;
+  return std::nullopt;
+}
+
+std::optional<std::string> readVolumeSettings(const tinygltf::Value& extras, std::optional<VolumeSettings>& settings) {
+  const auto lumel = lumelOf(extras);
+  if (!lumel || !lumel->IsObject() || !lumel->Has("volume")) return std::nullopt;
+  const tinygltf::Value volume = unquoted(lumel->Get("volume"));
+  constexpr const char* kProblem = "must be an object such as {\"size\": [4, 3, 4], \"cell\": 0.5}, in metres";
+  if (!volume.IsObject() || !volume.Has("size")) return kProblem;
+  settings.emplace();
+  for (const std::string& key : volume.Keys()) {
+    if (key == "size") {
+      if (auto problem = readVector<3>(volume.Get(key), "size must be three numbers of metres", settings->size))
+        return problem;
+    } else if (key == "cell") {
+      const double cell = volume.Get(key).IsNumber() ? volume.Get(key).GetNumberAsDouble() : 0.0;
+      if (!(cell > 0.0) || cell > 1e18) return "cell must be a number of metres above 0";
+      settings->cell = static_cast<float>(cell);
+    } else {
+      return "'" + key + "' is not known; use size and cell";
+    }
+  }
   return std::nullopt;
 }
 

@@ -70,6 +70,7 @@ class NodeFlattener {
   int plainUse(int mesh);
   void warnOfAreaLights();
   void addCamera(std::size_t node);
+  std::optional<Error> addVolume(std::size_t index);
 
   const GltfDocument& document_;
   const std::vector<tinygltf::Node>& nodes_;
@@ -267,12 +268,29 @@ void NodeFlattener::addCamera(std::size_t node) {
   scene_.cameras.push_back(std::move(camera));
 }
 
+/// The box lies around the node's origin, along the world's axes if the node is not turned, else around the turned one.
+std::optional<Error> NodeFlattener::addVolume(std::size_t index) {
+  std::optional<VolumeSettings> settings;
+  if (auto problem = readVolumeSettings(nodes_[index].extras, settings))
+    return document_.error(placeOf(index) + "/extras/lumel/volume", *problem);
+  if (!settings) return std::nullopt;
+  const glm::dmat4& world = worldFromNode_[index];
+  VolumeBox box{.name = nodes_[index].name.empty() ? placeOf(index) : nodes_[index].name, .cell = settings->cell};
+  Vec3d half(0.0);
+  for (int axis = 0; axis < 3; ++axis) half += glm::abs(Vec3d(world[axis])) * (0.5 * settings->size[axis]);
+  box.least = Vec3(Vec3d(world[3]) - half);
+  box.most = Vec3(Vec3d(world[3]) + half);
+  scene_.volumes.push_back(std::move(box));
+  return std::nullopt;
+}
+
 std::optional<Error> NodeFlattener::visit(std::size_t index) {
   const auto& node = nodes_[index];
   if (node.mesh >= 0)
     if (auto error = addMesh(index)) return error;
   if (node.camera >= 0) addCamera(index);
   if (auto error = addLight(document_, index, worldFromNode_[index], lightScale_, scene_)) return error;
+  if (auto error = addVolume(index)) return error;
   if (looksLikeAreaLight(node)) areaLights_.push_back(node.name.empty() ? placeOf(index) : node.name);
   return std::nullopt;
 }

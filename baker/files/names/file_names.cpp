@@ -37,6 +37,16 @@ bool isSsbumpMap(const std::string& name) {
                      [&rest](const auto& known) { return rest == known.second; });
 }
 
+bool isVolumeFile(const std::string& name) {
+  constexpr std::string_view prefix = "volume-";
+  if (name.rfind(prefix, 0) != 0) return false;
+  const std::size_t end = name.find_first_not_of("0123456789", prefix.size());
+  if (end == std::string::npos || end == prefix.size()) return false;
+  const std::string rest = name.substr(end);
+  const auto isRest = [&rest](const std::string& kind) { return rest == "-" + kind + ".exr"; };
+  return rest == ".json" || std::any_of(volumeKinds().begin(), volumeKinds().end(), isRest);
+}
+
 }  // namespace
 
 std::string pageFileName(std::size_t page, const std::string& kind) {
@@ -50,6 +60,19 @@ std::string ssbumpFileName(int image, const std::string& mimeType) {
   return "ssbump-" + std::to_string(image) + extension;
 }
 
+std::string volumeFileName(std::size_t volume) { return "volume-" + std::to_string(volume) + ".json"; }
+
+std::string volumeFileName(std::size_t volume, const std::string& kind) {
+  return "volume-" + std::to_string(volume) + "-" + kind + ".exr";
+}
+
+const std::vector<std::string>& volumeKinds() {
+  static const std::vector<std::string> kinds = {"sh0",   "sh1",   "sh2",   "sh3",    "sh4",   "sh5",
+                                                 "sh6",   "sh7",   "sh8",   "cube0",  "cube1", "cube2",
+                                                 "cube3", "cube4", "cube5", "points", "sight"};
+  return kinds;
+}
+
 std::vector<std::string> lightKinds(const std::vector<std::string>& mapNames) {
   std::vector<std::string> kinds = mapNames;
   if (std::find(kinds.begin(), kinds.end(), kFlat) == kinds.end()) kinds.push_back(kFlat);
@@ -57,7 +80,8 @@ std::vector<std::string> lightKinds(const std::vector<std::string>& mapNames) {
 }
 
 bool isBakeFile(const std::string& name) {
-  return isPageImage(name) || isSsbumpMap(name) || name == "sky.exr" || name == "scene.glb" || name == "bake.json";
+  return isPageImage(name) || isSsbumpMap(name) || isVolumeFile(name) || name == "sky.exr" || name == "scene.glb" ||
+         name == "bake.json";
 }
 
 }  // namespace lumel

@@ -5,6 +5,8 @@
 
 #include "baker/files/names/bake_format.h"
 #include "baker/files/names/file_names.h"
+#include "baker/files/read/baked_volumes.h"
+#include "baker/files/read/json_reader.h"
 #include "scene/images/image_io.h"
 #include "scene/load/load_scene.h"
 
@@ -14,55 +16,14 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// Access to JSON that may hold anything; the path names the place in messages.
-class Reader {
- public:
-  Reader(const Json& json, std::string file, std::string path = "")
-      : json_(&json), file_(std::move(file)), path_(std::move(path)) {}
-
-  Expected<Reader> at(const std::string& key) const {
-    const auto found = json_->is_object() ? json_->find(key) : json_->end();
-    if (found == json_->end()) return inputError(file_ + ": " + path_ + "/" + key + " is missing; bake again");
-    return Reader(*found, file_, path_ + "/" + key);
-  }
-  Expected<std::string> textAt(const std::string& key) const {
-    auto value = at(key);
-    if (!value) return value.error();
-    if (!value->json_->is_string()) return value->wrong("a text");
-    return value->json_->get<std::string>();
-  }
-  Expected<double> numberAt(const std::string& key) const {
-    auto value = at(key);
-    if (!value) return value.error();
-    if (!value->json_->is_number()) return value->wrong("a number");
-    return value->json_->get<double>();
-  }
-  Expected<Vec3> vectorAt(const std::string& key) const {
-    auto value = at(key);
-    if (!value) return value.error();
-    const Json& array = *value->json_;
-    if (!array.is_array() || array.size() != 3 || !array[0].is_number() || !array[1].is_number() ||
-        !array[2].is_number())
-      return value->wrong("three numbers");
-    return Vec3(array[0].get<float>(), array[1].get<float>(), array[2].get<float>());
-  }
-  const Json& json() const { return *json_; }
-  Error wrong(const std::string& wanted) const { return inputError(file_ + ": " + path_ + " is not " + wanted); }
-
- private:
-  const Json* json_;
-  std::string file_;
-  std::string path_;
-};
-
-Expected<void> readPages(const Reader& root, const fs::path& dir, const PageExtras& extras, BakedScene& baked) {
+Expected<void> readPages(const JsonReader& root, const fs::path& dir, const PageExtras& extras, BakedScene& baked) {
   const auto pages = root.at("pages");
   if (!pages) return pages.error();
   if (!pages->json().is_array()) return pages->wrong("a list");
   double texels = 0.0;
   Vec3d light(0.0);
   for (std::size_t i = 0; i < pages->json().size(); ++i) {
-    const Reader page(pages->json()[i], (dir / "bake.json").string(), "/pages/" + std::to_string(i));
+    const JsonReader page(pages->json()[i], (dir / "bake.json").string(), "/pages/" + std::to_string(i));
     const auto width = page.numberAt("width");
     const auto height = page.numberAt("height");
     const auto covered = page.numberAt("coveredTexels");
@@ -93,7 +54,7 @@ Expected<void> readPages(const Reader& root, const fs::path& dir, const PageExtr
   return {};
 }
 
-Expected<void> readSky(const Reader& root, const fs::path& dir, Environment& sky) {
+Expected<void> readSky(const JsonReader& root, const fs::path& dir, Environment& sky) {
   sky = Environment{};
   const auto json = root.at("sky");
   if (!json) return json.error();
@@ -149,7 +110,7 @@ Expected<Json> readBakeJson(const fs::path& dir) {
 }
 
 Expected<std::shared_ptr<const Encoding>> encodingOf(const Json& bake, const std::string& file) {
-  const Reader root(bake, file);
+  const JsonReader root(bake, file);
   std::string name = "rnm";
   if (bake.contains("encoding")) {
     const auto stated = root.at("encoding")->textAt("name");
@@ -172,7 +133,7 @@ Expected<BakedScene> readBake(const fs::path& dir, const PageExtras& extras) {
   const auto json = readBakeJson(dir);
   if (!json) return json.error();
   const std::string file = (dir / "bake.json").string();
-  const Reader root(*json, file);
+  const JsonReader root(*json, file);
   BakedScene baked;
   auto encoding = encodingOf(*json, file);
   if (!encoding) return encoding.error();
@@ -182,6 +143,11 @@ Expected<BakedScene> readBake(const fs::path& dir, const PageExtras& extras) {
   baked.scene = std::move(*scene);
   if (auto done = readSky(root, dir, baked.scene.environment); !done) return done.error();
   if (auto done = readPages(root, dir, extras, baked); !done) return done.error();
+  if (extras.volumes) {
+    auto volumes = readVolumes(dir);
+    if (!volumes) return volumes.error();
+    baked.volumes = *std::move(volumes);
+  }
   if (auto done = checkPages(baked, dir / "scene.glb"); !done) return done.error();
   return baked;
 }

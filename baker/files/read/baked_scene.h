@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "lightmap/maps/encoding.h"
+#include "lightmap/volume/light_volume.h"
 #include "scene/base/expected.h"
 #include "scene/scene.h"
 
@@ -20,6 +21,7 @@ struct BakedScene {
   std::vector<Image> flat;                                   // the flat map, page by page
   std::vector<Image> aux;                                    // what is known of texels (PageExtras), page by page
   std::vector<std::string> auxChannels;                      // "coverage", ...
+  std::vector<LightVolume> volumes;  // as the bake has them
   Vec3 meanFlat{0, 0, 0};                                    // mean irradiance / pi over all covered texels
 };
 
@@ -34,6 +36,7 @@ Expected<std::shared_ptr<const Encoding>> encodingOf(const nlohmann::ordered_jso
 struct PageExtras {
   bool flat = false;
   bool aux = false;
+  bool volumes = false;  // of the whole bake
 };
 
 /// Reads bake.json, scene.glb, the encoding's maps and the sky. Every page that a node or primitive names

@@ -8,6 +8,7 @@
 #include "baker/files/names/version.h"
 #include "baker/files/write/bake_json.h"
 #include "baker/files/write/glb_writer.h"
+#include "baker/files/write/volume_files.h"
 #include "scene/base/parallel.h"
 #include "scene/images/image_io.h"
 
@@ -136,6 +137,8 @@ Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasRes
     const std::string name = ssbumpFileName(image, source.mimeType);
     if (auto done = writeFile(name.c_str(), std::span(&source.encoded, 1)); !done) return done;
   }
+  for (std::size_t number = 0; number < result.volumes.size(); ++number)
+    if (auto done = writeVolume(*set, dir, number, result.volumes[number], record.half); !done) return done;
   const auto glb = encodeGlb(scene, atlas.atlas, record.sceneForm);
   if (!glb) return glb.error();
   if (auto done = writeFile("scene.glb", std::span<const std::vector<std::uint8_t>>(*glb)); !done) return done;

@@ -161,6 +161,13 @@ Json describeShadowMasks(const Scene& scene, const BakeResult& result) {
   return {{"lamps", std::move(rows)}, {"files", std::move(files)}};
 }
 
+/// The descriptions of the light volumes, by their files.
+Json describeVolumes(const BakeResult& result) {
+  Json files = Json::array();
+  for (std::size_t volume = 0; volume < result.volumes.size(); ++volume) files.push_back(volumeFileName(volume));
+  return files;
+}
+
 Json describeEncoding(const Encoding& encoding) {
   return {{"name", encoding.name()},
           {"maps", encoding.mapNames()},
@@ -271,6 +278,7 @@ std::string describeBake(const Scene& scene, const AtlasResult& atlas, const Bak
   json["sky"] = describeSky(scene.environment);
   json["lights"] = describeLights(scene);
   json["shadowMasks"] = describeShadowMasks(scene, result);
+  json["volumes"] = describeVolumes(result);
   json["atlas"] = {{"texelsPerMeter", atlas.atlas.texelsPerMeter},
                    {"charts", atlas.atlas.charts.size()},
                    {"generatedCharts", atlas.report.generatedCharts},
