@@ -44,6 +44,47 @@ std::set<std::string> namesIn(const fs::path& dir) {
   return names;
 }
 
+TEST(BakeFiles, LightVolumesAreReadAsTheyWereWritten) {
+  const fs::path dir = scratch();
+  Fixture bake(1);
+  LightVolume volume = volumeOf(Vec3(-1, 0, 2), Vec3(1, 1.5f, 4.5f), 0.5f);
+  volume.name = "Hall";
+  float value = 0.0f;
+  const auto next = [&value] { return value += 0.25f; };
+  for (VolumePoint& point : volume.points) {
+    point.isValid = static_cast<int>(value) % 3 != 0;
+    point.offset = Vec3(value, -value, 0.5f);
+    for (Vec3& sh : point.harmonics) sh = Vec3(next(), -2.5f, 1.0f);
+    for (Vec3& face : point.cube) face = Vec3(next(), 2.0f, -1.0f);
+    for (float& sight : point.nearness) sight = next();
+  }
+  bake.result.volumes = {volume, volumeOf(Vec3(0.0f), Vec3(0.0f), 1.0f)};
+  ASSERT_TRUE(bake.write(dir));
+  const auto read = readBake(dir, {.volumes = true});
+  ASSERT_TRUE(read) << read.error().message;
+  ASSERT_EQ(read->volumes.size(), 2u);
+  const LightVolume& same = read->volumes[0];
+  EXPECT_EQ(same.name, "Hall");
+  EXPECT_EQ(same.origin, volume.origin);
+  EXPECT_EQ(same.cell, volume.cell);
+  EXPECT_EQ(same.counts, volume.counts);
+  for (std::size_t i = 0; i < volume.points.size(); ++i) {
+    EXPECT_EQ(same.points[i].isValid, volume.points[i].isValid);
+    EXPECT_EQ(same.points[i].offset, volume.points[i].offset);
+    EXPECT_EQ(same.points[i].harmonics, volume.points[i].harmonics);
+    EXPECT_EQ(same.points[i].cube, volume.points[i].cube);
+    EXPECT_EQ(same.points[i].nearness, volume.points[i].nearness);
+  }
+  // A bake without volumes leaves none behind, and a damaged one is named.
+  std::ofstream(dir / "volume-0.json") << R"({"format": 1, "name": "", "origin": [0, 0, 0], "cell": [1, 1, 1],
+      "counts": [1e9, 1e9, 1e9]})";
+  const auto damaged = readBake(dir, {.volumes = true});
+  ASSERT_FALSE(damaged);
+  EXPECT_TRUE(mentions(damaged.error().message, "volume-0.json"));
+  ASSERT_TRUE(Fixture(1).write(dir));
+  EXPECT_EQ(namesIn(dir).count("volume-0.json") + namesIn(dir).count("volume-0-sh0.exr"), 0u);
+}
+
 TEST(BakeFiles, SmallerBakeReplacesALargerOneAndLeavesOtherFilesAlone) {
   const fs::path dir = scratch();
   Fixture large(2);

@@ -7,6 +7,7 @@
 
 #include "baker/stills/label.h"
 #include "baker/stills/lamps.h"
+#include "baker/stills/placed_object.h"
 #include "baker/stills/sheet.h"
 #include "baker/stills/viewpoint.h"
 #include "ssbump/maps/weights.h"
@@ -28,6 +29,33 @@ Compositor compositorOf(const BakedScene& baked) {
   auto made = Compositor::make(baked);
   EXPECT_TRUE(made) << made.error().message;
   return *std::move(made);
+}
+
+// A model that is placed into the left half of a volume takes its light, one outside of it the mean of the bake.
+TEST(Compositor, PlacedObjectsStandInTheLightOfTheirVolume) {
+  TestScene level, model;
+  level.addRectangle({-4, -1, -1}, {8, 0, 0}, {0, 2, 0}, {.texels = 0});
+  const int red = model.addMaterial({0.5f, 0.0f, 0.0f});
+  model.addRectangle({-0.5f, -0.5f, 0}, {1, 0, 0}, {0, 1, 0}, {.material = red, .texels = 0});
+  const auto lightAt = [&](const Vec3& at) {
+    BakedScene baked = litEvenly(level);
+    LightVolume volume = volumeOf(Vec3(-4, -1, -0.5f), Vec3(0, 1, 1), 1.0f);
+    for (VolumePoint& point : volume.points) {
+      point.isValid = true;
+      point.harmonics[0] = Vec3(4.0f / 0.28209479f);  // radiance 4 from everywhere
+    }
+    baked.volumes = {volume};
+    placeObject(baked.scene, model.scene, at);
+    const Compositor compositor = compositorOf(baked);
+    RenderOptions options;
+    options.width = options.height = 3;
+    options.samplesPerPixel = 1;
+    const auto still = compositor.render(cameraLookingAt(at + Vec3(0, 0, 1), at, 0.5f), options, noProgress());
+    EXPECT_TRUE(still);
+    return still->radiance.rgb(1, 1);
+  };
+  EXPECT_LT(glm::length(lightAt({-2, 0, 0}) - Vec3(2.0f, 0.0f, 0.0f)), 1e-5f);
+  EXPECT_LT(glm::length(lightAt({2, 0, 0}) - Vec3(0.5f, 0.0f, 0.0f)), 1e-5f);
 }
 
 TEST(Compositor, FineStripesFarAwayAreGreyWithOneRay) {

@@ -274,6 +274,34 @@ TEST(Bake, ShadowMasksOfUpToFourLamps) {
   EXPECT_NE(five.err.find("'Lamp 4' is number 5 of 5 with a shadow mask"), std::string::npos) << five.err;
 }
 
+TEST(Bake, LightVolumes) {
+  const auto dir = scratch();
+  writeFile(dir / "floor.gltf", gltfOf({floorQuad()}).dump());
+  const auto bake = [&](std::vector<std::string> more) {
+    std::vector<std::string> all = {
+        "bake", dir / "floor.gltf", "-o", dir / "out", "--page-size", "16",      "--samples",
+        "16",   "--sky-color",      "1",  "1",         "1",           "--volume"};
+    all.insert(all.end(), more.begin(), more.end());
+    return run(all);
+  };
+  const Outcome outcome = bake({"2", "0.5", "0", "0", "1.5", "1", "--cell", "1"});  // corners in any order
+  ASSERT_EQ(outcome.exitCode, 0) << outcome.err;
+  const nlohmann::json volume = readJson(dir / "out" / "volume-0.json");
+  EXPECT_EQ(volume["counts"], nlohmann::json({3, 2, 2}));
+  EXPECT_EQ(volume["valid"], 12);
+  EXPECT_EQ(readJson(dir / "out" / "bake.json")["volumes"], nlohmann::json({"volume-0.json"}));
+  const Image up = readPixels(dir / "out" / "volume-0-cube2.exr");
+  ASSERT_EQ(up.width, 3);
+  ASSERT_EQ(up.height, 4);
+  EXPECT_NEAR(up.at(1, 1)[0], 1.0f, 0.05f);  // the sky above, by 128 rays
+  const Outcome many = bake({"0", "0", "0", "9", "9", "9", "--cell", "0.01"});
+  EXPECT_EQ(many.exitCode, 2);
+  EXPECT_NE(many.err.find("give wider cells"), std::string::npos) << many.err;
+  const Outcome path = bake({"0", "0", "0", "1", "1", "1", "--integrator", "path"});
+  EXPECT_EQ(path.exitCode, 2);
+  EXPECT_NE(path.err.find("--integrator gather"), std::string::npos) << path.err;
+}
+
 TEST(Bake, ErrorOfTooFewSamplesIsNotZero) {
   const auto dir = scratch();
   writeFile(dir / "floor.gltf", gltfOf({floorQuad()}).dump());

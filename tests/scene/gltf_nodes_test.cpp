@@ -175,7 +175,33 @@ TEST(GltfNodes, ObjectSettingsFromMeshAndNodeExtras) {
   EXPECT_EQ(message({{"scale", 0}}), "test.glb: nodes/0/extras/lumel: scale must be a number above 0");
   EXPECT_EQ(message({{"casts", 2}}), "test.glb: nodes/0/extras/lumel: casts must be true or false");
   EXPECT_EQ(message({{"scales", 1}}),
-            "test.glb: nodes/0/extras/lumel: 'scales' is not known; use scale, casts, receives or light");
+            "test.glb: nodes/0/extras/lumel: 'scales' is not known; use scale, casts, receives, light or volume");
+}
+
+TEST(GltfNodes, LightVolumes) {
+  GltfBuilder g;
+  g.square();
+  g.add("nodes", {{"name", "Hall"},
+                  {"translation", {1, 2, 3}},
+                  {"scale", {2, 1, 1}},
+                  {"extras", {{"lumel", {{"volume", {{"size", {4, 3, 2}}, {"cell", 0.25}}}}}}}});
+  g.json["scenes"][0]["nodes"].push_back(1);
+  LOAD_OR_FAIL(scene, g.load());
+  ASSERT_EQ(scene.volumes.size(), 1u);
+  EXPECT_EQ(scene.volumes[0].name, "Hall");
+  expectNear(scene.volumes[0].least, {-3, 0.5f, 2});
+  expectNear(scene.volumes[0].most, {5, 3.5f, 4});
+  EXPECT_EQ(scene.volumes[0].cell, 0.25f);
+  const auto message = [&](const Json& volume) {
+    g.json["nodes"][1]["extras"]["lumel"]["volume"] = volume;
+    auto result = g.load();
+    return result ? std::string() : result.error().message;
+  };
+  const std::string place = "test.glb: nodes/1/extras/lumel/volume: ";
+  EXPECT_EQ(message(5), place + "must be an object such as {\"size\": [4, 3, 4], \"cell\": 0.5}, in metres");
+  EXPECT_EQ(message({{"size", {1, 1}}}), place + "size must be three numbers of metres");
+  EXPECT_EQ(message({{"size", {1, 1, 1}}, {"cell", 0}}), place + "cell must be a number of metres above 0");
+  EXPECT_EQ(message({{"size", {1, 1, 1}}, {"step", 1}}), place + "'step' is not known; use size and cell");
 }
 
 TEST(GltfNodes, DeepTreesDoNotOverflowTheStack) {
