@@ -54,9 +54,10 @@ void storeAux(Image& aux, TexelCoord at, const BakedTexel& texel, const Encoding
   ++stats.validTexels;
   stats.luminance += static_cast<double>(luminance(stored.flat));
   if (!texel.probed) return;
+  const StoredEncoding first = encoding.stored().front();
   for (std::size_t i = 0; i < kProbeNormals; ++i) {
-    const auto difference =
-        static_cast<double>(luminance(encoding.decode(stored.maps, probeNormals()[i])) - luminance(texel.probes[i]));
+    const auto difference = static_cast<double>(
+        luminance(decodeSampled(first, stored.maps, stored.flat, probeNormals()[i])) - luminance(texel.probes[i]));
     stats.residualSquares += difference * difference;
     ++stats.residuals;
   }

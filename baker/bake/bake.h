@@ -24,13 +24,13 @@ namespace lumel {
 
 /// One atlas page. All images have the page's size; texels without coverage are 0 everywhere.
 struct BakedPage {
-  std::vector<Image> maps;  // RGB: those of BakeOptions::encoding, in their order
+  std::vector<Image> maps;  // RGB: those that BakeOptions::encoding samples, in their order; see encodePages
   Image flat;               // RGB: irradiance / pi
   // Channels of aux, in order: coverage (area share 0..1), validity (share of gather rays that met no back of a
   // single-sided surface), stderr (standard error of the flat map's luminance; NaN: not known), samples (those taken of
   // this texel: fewer where its error has settled, or where it is inside of something).
   Image aux;
-  Image mapErrors;  // a channel for each of `maps`: standard error of its luminance; NaN: not known
+  Image mapErrors;  // a channel for each map that is sampled: standard error of its luminance; NaN: not known
 };
 
 /// Mean standard error of a map's luminance over covered, valid texels of which it is known.

@@ -37,7 +37,7 @@ struct BakeOptions {
   // it moves partly covered ones too far.
   bool seams = false;
   std::uint64_t seed = 1;
-  std::shared_ptr<const Encoding> encoding = rnmEncoding();
+  std::shared_ptr<const Encoding> encoding = rnmEncoding();  // jointEncoding for several
 };
 
 /// Names as they stand in files and messages.

@@ -1,6 +1,7 @@
 #include "baker/bake/finish.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -94,12 +95,13 @@ void addBeyond(const Seams& seams, std::span<const BeyondTexel> beyond, std::vec
   }
 }
 
-void denoisePage(BakedPage& page, PageState& state, const Seams& seams, std::span<const BeyondTexel> beyond) {
+void denoisePage(BakedPage& page, PageState& state, const Seams& seams, std::span<const BeyondTexel> beyond,
+                 std::size_t judges) {
   std::vector<std::uint32_t> charts = state.chartIds;
   for (std::size_t i = 0; i < charts.size(); ++i)
     if (state.valid.known[i] == 0) charts[i] = 0;
   addBeyond(seams, beyond, charts, state);
-  denoise(page.flat, page.maps, charts, state.normals, errorsOf(page));
+  denoise(page.flat, page.maps, charts, state.normals, errorsOf(page), judges);
 }
 
 /// Calls grow(image) for the maps' errors, a channel for each.
@@ -115,12 +117,14 @@ void growErrors(BakedPage& page, const Grow& grow) {
     for (std::size_t m = 0; m < planes.size(); ++m) planes[m][i] = errors.pixels[i * planes.size() + m];
 }
 
-std::vector<SeamPage> seamPagesOf(std::vector<BakedPage>& pages, bool isSigned) {
+/// The maps of one group, with a flat map that they share with it or have for themselves.
+std::vector<SeamPage> seamPagesOf(std::vector<BakedPage>& pages, const MapGroup& group, std::vector<Image>& ownFlat) {
   std::vector<SeamPage> seamPages;
-  for (BakedPage& page : pages) {
+  for (std::size_t p = 0; p < pages.size(); ++p) {
+    BakedPage& page = pages[p];
     SeamPage& to = seamPages.emplace_back();
-    to.flat = &page.flat;
-    to.maps = page.maps;
+    to.flat = ownFlat.empty() ? &page.flat : &ownFlat[p];
+    to.maps = std::span(page.maps).subspan(group.first, group.count);
     to.states.assign(page.aux.pixels.size() / 4, TexelState::Empty);
     for (std::size_t i = 0; i < to.states.size(); ++i)
       if (page.aux.pixels[i * 4] > 0.0f)
@@ -128,7 +132,7 @@ std::vector<SeamPage> seamPagesOf(std::vector<BakedPage>& pages, bool isSigned) 
     to.errors = std::span(page.aux.pixels).subspan(std::min(kErrorChannel, page.aux.pixels.size()));
     to.coverages = page.aux.pixels;
     to.stride = 4;
-    to.isSigned = isSigned;
+    to.isSigned = group.isSigned;
   }
   return seamPages;
 }
@@ -138,6 +142,65 @@ std::span<const BeyondTexel> onPage(const std::vector<BeyondTexel>& beyond, std:
   const auto [first, last] = std::ranges::equal_range(beyond, page, {}, &BeyondTexel::page);
   return {first, last};
 }
+
+/// Seams in all groups of maps. Each is mended beside the flat map as it was, so that the result of one does not depend
+/// on others; the page keeps the flat map of the first.
+class SeamMending {
+ public:
+  SeamMending(const Seams& seams, std::vector<BakedPage>& pages, const std::vector<MapGroup>& groups)
+      : seams_(seams), pages_(pages), groups_(groups) {
+    mends_ = !seams.points.empty() && std::ranges::all_of(groups, [](const MapGroup& g) { return canMend(g.count); });
+  }
+
+  /// Sorted by page; empty where nothing is mended.
+  const std::vector<BeyondTexel>& beyond() const { return beyond_; }
+
+  void continueAll() {
+    if (!mends_) return;
+    std::vector<Image> flat = flatMaps();
+    forEachGroup(flat, [&](std::vector<SeamPage>& seamPages) {
+      if (beyond_.empty()) beyond_ = texelsBeyond(seams_, seamPages);
+      continueLight(seams_, beyond_, seamPages);
+    });
+    for (const BeyondTexel& texel : beyond_)
+      for (const ErrorPlane& plane : errorsOf(pages_[texel.page]))
+        plane[texel.texel] = errorAround(pages_[texel.page].aux, plane, texel.texel);
+  }
+
+  SeamFigures mendAll() {
+    SeamFigures figures;
+    if (!mends_) return figures;
+    std::vector<Image> flat = flatMaps();
+    forEachGroup(flat, [&](std::vector<SeamPage>& seamPages) {
+      for (const BeyondTexel& texel : beyond_) seamPages[texel.page].states[texel.texel] = TexelState::Beyond;
+      const SeamFigures own = mendSeams(seams_, beyond_, seamPages);
+      if (figures.points == 0) figures = own;
+    });
+    return figures;
+  }
+
+ private:
+  std::vector<Image> flatMaps() const {
+    std::vector<Image> flat;
+    if (groups_.size() > 1)
+      for (const BakedPage& page : pages_) flat.push_back(page.flat);
+    return flat;
+  }
+  template <class Mend>
+  void forEachGroup(const std::vector<Image>& flat, const Mend& mend) {
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      std::vector<Image> own = g == 0 ? std::vector<Image>() : flat;
+      std::vector<SeamPage> seamPages = seamPagesOf(pages_, groups_[g], own);
+      mend(seamPages);
+    }
+  }
+
+  const Seams& seams_;
+  std::vector<BakedPage>& pages_;
+  const std::vector<MapGroup>& groups_;
+  std::vector<BeyondTexel> beyond_;
+  bool mends_ = false;
+};
 
 /// Calls map(image) for each map of a page, in parallel.
 template <class Map>
@@ -158,37 +221,63 @@ void dilatePage(BakedPage& page, std::span<const BeyondTexel> beyond, int rings)
   growErrors(page, [&](Image& errors) { dilate(errors, known, rings); });
 }
 
+/// A page's maps of one encoding.
+std::vector<Image> storedMaps(const BakedPage& page, const StoredEncoding& stored) {
+  const Encoding& encoding = *stored.encoding;
+  const auto from = page.maps.begin() + static_cast<std::ptrdiff_t>(stored.first);
+  if (!encoding.source() && encoding.mapNames().front() != kFlatMap)
+    return {from, from + static_cast<std::ptrdiff_t>(encoding.mapCount())};
+  std::vector<Image> images(encoding.mapCount(), Image(page.flat.width, page.flat.height, 3));
+  const std::size_t sampledCount = page.maps.size() - stored.first;
+  parallelFor(static_cast<std::size_t>(page.flat.height), 16, [&](std::size_t firstRow, std::size_t lastRow) {
+    std::array<Vec3, kMostMaps> sampled{}, maps{};
+    for (int y = static_cast<int>(firstRow); y < static_cast<int>(lastRow); ++y)
+      for (int x = 0; x < page.flat.width; ++x) {
+        for (std::size_t k = 0; k < sampledCount; ++k) sampled[k] = from[static_cast<std::ptrdiff_t>(k)].rgb(x, y);
+        encoding.derive(std::span(sampled).first(sampledCount), page.flat.rgb(x, y),
+                        std::span(maps).first(images.size()));
+        for (std::size_t k = 0; k < images.size(); ++k) images[k].setRgb(x, y, maps[k]);
+      }
+  });
+  return images;
+}
+
 }  // namespace
 
 SeamFigures finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels,
                         const FinishOptions& options) {
   static const Seams kNoSeams;
   const Seams& seams = options.seams != nullptr && options.rings > 0 ? *options.seams : kNoSeams;
-  std::vector<SeamPage> seamPages;
-  std::vector<BeyondTexel> beyond;
-  const bool mends = !seams.points.empty() && canMend(pages.front().maps.size());
-  if (mends) {
-    seamPages = seamPagesOf(pages, options.isSigned);
-    beyond = texelsBeyond(seams, seamPages);
-    continueLight(seams, beyond, seamPages);
-    for (const BeyondTexel& texel : beyond)
-      for (const ErrorPlane& plane : errorsOf(pages[texel.page]))
-        plane[texel.texel] = errorAround(pages[texel.page].aux, plane, texel.texel);
-  }
+  const std::size_t maps = pages.empty() ? 0 : pages.front().maps.size();
+  const std::vector<MapGroup> groups = options.groups.empty() ? std::vector<MapGroup>{{0, maps}} : options.groups;
+  SeamMending mending(seams, pages, groups);
+  mending.continueAll();
   for (std::size_t p = 0; p < pages.size(); ++p) {
     PageState state = stateOf(pages[p], atlas, texels[p], options.denoise);
-    if (options.denoise) denoisePage(pages[p], state, seams, onPage(beyond, p));
+    if (options.denoise) denoisePage(pages[p], state, seams, onPage(mending.beyond(), p), groups.front().count);
     if (state.hasHoles) {
       const auto fill = [&](Image& map) { fillHoles(map, state.valid, state.chartIds, state.holes); };
       forEachMap(pages[p], fill);
       growErrors(pages[p], fill);
     }
   }
-  SeamFigures figures;
-  if (mends) figures = mendSeams(seams, beyond, seamPages);
+  const SeamFigures figures = mending.mendAll();
   if (options.rings > 0)
-    for (std::size_t p = 0; p < pages.size(); ++p) dilatePage(pages[p], onPage(beyond, p), options.rings);
+    for (std::size_t p = 0; p < pages.size(); ++p) dilatePage(pages[p], onPage(mending.beyond(), p), options.rings);
   return figures;
+}
+
+void encodePages(std::vector<BakedPage>& pages, const Encoding& encoding) {
+  const std::vector<StoredEncoding> all = encoding.stored();
+  for (BakedPage& page : pages) {
+    std::vector<Image> images;
+    for (const StoredEncoding& stored : all) {
+      std::vector<Image> own = storedMaps(page, stored);
+      for (std::size_t k = 0; k < own.size(); ++k)
+        if (stored.encoding->mapNames()[k] != kFlatMap) images.push_back(std::move(own[k]));
+    }
+    page.maps = std::move(images);
+  }
 }
 
 void cutToHalf(BakeResult& result) {

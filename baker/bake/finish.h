@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "baker/bake/bake.h"
+#include "lightmap/maps/encoding.h"
 #include "lightmap/seams/seam_maps.h"
 #include "lightmap/seams/seams.h"
 #include "lightmap/surface.h"
@@ -16,7 +17,9 @@ struct FinishOptions {
   bool denoise = false;
   int rings = 0;                 // of texels that maps grow by, beyond what is covered
   const Seams* seams = nullptr;  // where lookups from both sides shall agree; of no effect without rings
-  bool isSigned = false;         // whether maps may be negative (Encoding::isSigned)
+  // What of the maps belongs together (Encoding::groups), the first encoding's first: its maps tell, with the flat one,
+  // where noise is taken out. Empty: all of them do, and none is negative.
+  std::vector<MapGroup> groups{};
 };
 
 /// First noise is taken out of the maps, if asked for (lightmap/denoise.h); invalid texels take no part.
@@ -28,6 +31,10 @@ struct FinishOptions {
 /// they are then, also where these were grown; the other aux channels stay as they are and tell own values from others.
 SeamFigures finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const std::vector<PageTexels>& texels,
                         const FinishOptions& options);
+
+/// Replaces the sampled maps by those that are stored: of each of Encoding::stored in turn, but for the flat map. After
+/// finishPages: from here on maps may hold directions. Of no effect on an encoding that stores what it samples.
+void encodePages(std::vector<BakedPage>& pages, const Encoding& encoding);
 
 /// The largest number that a half holds.
 inline constexpr float kMostHalf = 65504.0f;

@@ -11,6 +11,7 @@
 #include "baker/bake/quality.h"
 #include "baker/bake/shadow_masks.h"
 #include "baker/commands/command.h"
+#include "baker/commands/encoding_list.h"
 #include "baker/commands/scene_arguments.h"
 #include "baker/commands/stage_clock.h"
 #include "baker/commands/volume_arguments.h"
@@ -59,6 +60,7 @@ struct BakeArguments : SceneArguments {
   Quality quality = Quality::Production;
   int samples = 0;  // 0: as the quality has it
   Projection projection = Projection::Flat;
+  std::string encodings = "rnm";  // names, comma between them
 };
 
 void declareLightOptions(OptionTable& options, BakeArguments& a) {
@@ -89,12 +91,18 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
                "Also bake how much of up to four lamps marked by extras.lumel.light.shadow_mask each texel sees, into "
                "one RGBA map per page");
   declareSkyAndSides(options, a);
+  options
+      .text("encoding", a.encodings,
+            "What is stored of the light, names with commas between, all from the same rays; readers take the first "
+            "unless told otherwise. The flat map is always stored. Below is what each is for")
+      .placeholder = "NAME,...";
   options.choice(
       "projection", a.projection, {"raw", "flat", "fit", "signed"},
-      "How light is spread over the three maps. flat: exact on flat normals, for gentle normal maps; under "
+      "How light is spread over the maps of rnm. flat: exact on flat normals, for gentle normal maps; under "
       "grazing light a bump that faces it gets .27 where .50 is right. raw: clamped dots, .48 there, but .58 "
       "to .79 of the light of flat normals. fit: least squares for normals within 30 degrees, exact on flat "
-      "ones. signed: plain dots, maps may be negative, to be decoded with linear weights");
+      "ones. signed: plain dots, maps may be negative, to be decoded with linear weights. Of the other encodings raw "
+      "are plain projections, the rest exact on flat normals");
   options.choice(
       "audit", a.audit, {"auto", "on", "off"},
       "Path trace texels drawn at random and compare them with the finished maps: finds light that is wrong, "
@@ -308,7 +316,6 @@ BakeRecord recordOf(const BakeArguments& a, int dilate, nlohmann::ordered_json s
   record.atlasOptions = a.atlas;
   record.bakeOptions = a.bake;
   record.bakeOptions.samples = samplesOf(a);
-  record.bakeOptions.encoding = rnmEncoding(a.projection);
   record.dilate = dilate;
   record.half = a.half;
   record.sceneForm = a.flatten ? SceneForm::Flattened : SceneForm::Instances;
@@ -348,7 +355,10 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   context.settings["denoise"] = denoises(a) ? "on" : "off";
   context.settings["audit"] = audits(a) ? "on" : "off";
   const int dilate = a.dilate == kDilateByPadding ? (a.atlas.padding + 1) / 2 : a.dilate;
+  auto encoding = encodingsOf(a.encodings, a.projection);
+  if (!encoding) return encoding.error();
   BakeRecord record = recordOf(a, dilate, context.settings);
+  record.bakeOptions.encoding = std::move(*encoding);
 
   StageClock clock(context.quiet);
   Progress& progress = context.progress;
@@ -405,8 +415,9 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
                                    {.denoise = denoises(a),
                                     .rings = dilate,
                                     .seams = &baked->seams,
-                                    .isSigned = record.bakeOptions.encoding->isSigned()});
+                                    .groups = record.bakeOptions.encoding->groups()});
   baked->stats.errors = statedErrors(baked->pages, *record.bakeOptions.encoding);
+  encodePages(baked->pages, *record.bakeOptions.encoding);
   if (a.half) cutToHalf(*baked);
   if (a.shadowMasks) {
     clock.start("shadow masks");
@@ -458,16 +469,16 @@ Command bakeCommand() {
   command.name = "bake";
   command.summary = "Bake a scene into lightmaps: three RNM maps and a flat one per atlas page";
   command.takesConfig = true;
-  command.examples =
-      "Examples:\n"
-      "  lumel bake level.gltf -o out/level\n"
-      "      lights and emissive surfaces of the file, one page of 1024 x 1024\n"
-      "  lumel bake level.glb -o out/level --sky noon.hdr --sky-rotation 90 --texels-per-meter 16\n"
-      "      light from a sky image, as many pages as 16 texels per metre need\n"
-      "  lumel bake level.obj -o out/level --sky-color 0.4 0.6 1 --samples 64 --bounces 2\n"
-      "      a quick preview under an even blue sky\n"
-      "  lumel bake --config level.toml\n"
-      "      everything from a file: scene = \"level.gltf\", output = \"out/level\", samples = 1024";
+  command.examples = describeEncodingChoices() +
+                     "Examples:\n"
+                     "  lumel bake level.gltf -o out/level\n"
+                     "      lights and emissive surfaces of the file, one page of 1024 x 1024\n"
+                     "  lumel bake level.glb -o out/level --sky noon.hdr --sky-rotation 90 --texels-per-meter 16\n"
+                     "      light from a sky image, as many pages as 16 texels per metre need\n"
+                     "  lumel bake level.obj -o out/level --sky-color 0.4 0.6 1 --samples 64 --bounces 2\n"
+                     "      a quick preview under an even blue sky\n"
+                     "  lumel bake --config level.toml\n"
+                     "      everything from a file: scene = \"level.gltf\", output = \"out/level\", samples = 1024";
   declareOptions(command.options, *arguments);
   command.run = [arguments](CommandContext& context) { return runBake(*arguments, context); };
   return command;

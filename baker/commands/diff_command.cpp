@@ -171,19 +171,24 @@ Expected<void> checkCharts(const DiffArguments& a, const Json& first, const Json
   return {};
 }
 
-/// The images that both bakes have: the maps of their encoding and the flat one; where they have not the same encoding,
-/// the flat one alone.
+/// The images that both bakes have: the maps of the encodings of both and the flat one.
 Expected<std::vector<std::string>> commonKinds(const DiffArguments& a, const Json& first, const Json& second,
                                                bool quiet) {
-  const auto one = encodingOf(first, (a.a / "bake.json").string());
-  if (!one) return one.error();
-  const auto other = encodingOf(second, (a.b / "bake.json").string());
-  if (!other) return other.error();
-  if ((*one)->name() == (*other)->name()) return lightKinds((*one)->mapNames());
-  if (!quiet)
+  const std::vector<std::string> ours = encodingNames(first), theirs = encodingNames(second);
+  std::vector<std::string> maps;
+  bool isAnyCommon = false;
+  for (const std::string& name : ours) {
+    if (std::find(theirs.begin(), theirs.end(), name) == theirs.end()) continue;
+    isAnyCommon = true;
+    const auto encoding = encodingOf(first, (a.a / "bake.json").string(), name);
+    if (!encoding) return encoding.error();
+    for (const std::string& map : (*encoding)->mapNames())
+      if (std::find(maps.begin(), maps.end(), map) == maps.end()) maps.push_back(map);
+  }
+  if (!isAnyCommon && !quiet)
     std::fprintf(stderr, "lumel: warning: %s is encoded as %s, %s as %s: only their flat maps are compared\n",
-                 a.a.c_str(), (*one)->name().c_str(), a.b.c_str(), (*other)->name().c_str());
-  return lightKinds({});
+                 a.a.c_str(), ours.front().c_str(), a.b.c_str(), theirs.front().c_str());
+  return lightKinds(maps);
 }
 
 Expected<void> diffBakes(const DiffArguments& a, CommandContext& context) {

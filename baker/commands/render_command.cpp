@@ -43,6 +43,7 @@ struct RenderArguments {
   std::string lamps;
   fs::path object;
   std::optional<Vec3> at;
+  std::string encoding;
   std::optional<float> exposure;
   ToneMap toneMap = ToneMap::Aces;
   int threads = 0;
@@ -62,6 +63,8 @@ void declareOptions(OptionTable& options, RenderArguments& a) {
           "mode", a.modes,
           "What to show; several, separated by commas, make a sheet of panels with their names. " + describeShadings())
       .placeholder = "NAME,...";
+  options.text("encoding", a.encoding, "Which of the bake's encodings is decoded").defaultText = "its first";
+  options.find("encoding")->placeholder = "NAME";
   options
       .text("light", a.lamps,
             "Lights that are not in the bake, with shadows, separated by semicolons: point:X,Y,Z:CANDELA, "
@@ -225,7 +228,7 @@ Expected<void> runRender(const RenderArguments& a, CommandContext& context) {
   if (auto checked = checkOutput(a); !checked) return checked;
   const ThreadLimit limit(a.threads);
   const std::vector<const Shading*> modes = *modesOf(a);
-  auto baked = readBake(a.bake, {.flat = true, .aux = true, .volumes = true});
+  auto baked = readBake(a.bake, {.encoding = a.encoding, .flat = true, .aux = true, .volumes = true});
   if (!baked) return baked.error();
   if (!a.object.empty()) {
     const auto object = loadScene(a.object);

@@ -41,6 +41,8 @@ constexpr float kBiasShare = 0.05f;
 /// Noise below this share of a texel's light is rounding. It is not more than that light either: stated errors are
 /// shared with the texels around, and dark ones beside bright ones would take from these.
 constexpr float kLeastRelativeError = 1e-5f;
+/// More maps would hardly tell more of where texels differ.
+constexpr std::size_t kMostJudges = 6;
 
 /// Part of a page, with a margin around it, one plane per quantity so that loops along rows vectorise.
 struct Tile {
@@ -55,6 +57,7 @@ struct Tile {
   // Of all maps, the flat one first.
   std::vector<std::vector<float>> luminances;
   std::vector<std::vector<float>> colors;
+  std::size_t judges = 0;  // so many of the encoding's maps tell how far texels are apart
 
   std::size_t maps() const { return luminances.size(); }
   std::size_t at(std::ptrdiff_t row, std::ptrdiff_t x) const {
@@ -100,6 +103,7 @@ struct Rows {
 struct Judged {
   std::span<const std::uint32_t> chartIds;
   std::span<const CoarseNormal> normals;
+  std::size_t judges = 0;
 };
 
 Tile readTile(Rows& from, const Judged& judged, std::ptrdiff_t firstRow, std::size_t rows, std::ptrdiff_t firstColumn,
@@ -108,6 +112,7 @@ Tile readTile(Rows& from, const Judged& judged, std::ptrdiff_t firstRow, std::si
   const std::ptrdiff_t height = from.maps[0]->height;
   Tile tile;
   tile.rows = rows;
+  tile.judges = judged.judges;
   tile.columns = columns;
   tile.stride = columns + 2 * kHalo;
   const std::size_t count = tile.stride * (rows + 2 * kHalo);
@@ -229,11 +234,10 @@ template <std::size_t Maps>
   }
 }
 
-/// The same for as many maps as the tile has: with their number known the loop over texels becomes vector code.
+/// The same for as many maps as judge: with their number known the loop over texels becomes vector code.
 [[gnu::always_inline]] inline void distancesOf(const Tile& tile, std::size_t first, std::ptrdiff_t shift,
                                                std::size_t count, float* distance) {
-  static_assert(kMostMaps == 6);
-  switch (tile.maps() - 1) {
+  switch (tile.judges) {
     case 1:
       return distancesOf<1>(tile, first, shift, count, distance);
     case 2:
@@ -516,7 +520,7 @@ void restoreLight(std::span<Image* const> maps, std::span<const std::uint32_t> c
 }  // namespace
 
 void denoise(Image& flat, std::span<Image> encoded, std::span<const std::uint32_t> chartIds,
-             std::span<const CoarseNormal> normals, std::span<const ErrorPlane> errors) {
+             std::span<const CoarseNormal> normals, std::span<const ErrorPlane> errors, std::size_t judges) {
   const std::size_t count = static_cast<std::size_t>(flat.width) * static_cast<std::size_t>(flat.height);
   LUMEL_CHECK(chartIds.size() == count && errors.size() == 1 + encoded.size());
   LUMEL_CHECK(!encoded.empty() && encoded.size() <= kMostMaps);
@@ -526,7 +530,7 @@ void denoise(Image& flat, std::span<Image> encoded, std::span<const std::uint32_
     LUMEL_CHECK(map->width == flat.width && map->height == flat.height && map->channels == 3);
   if (chartIds.empty()) return;
   const std::vector<double> light = lightOfCharts(flat, chartIds);
-  averagePage(maps, errors, {chartIds, normals});
+  averagePage(maps, errors, {chartIds, normals, std::min({judges, encoded.size(), kMostJudges})});
   restoreLight(maps, chartIds, light);
 }
 

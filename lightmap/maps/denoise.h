@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 
+#include "lightmap/maps/encoding.h"
 #include "scene/image.h"
 
 namespace lumel {
@@ -25,12 +26,13 @@ struct ErrorPlane {
 /// `flat` and `encoded`, the maps of an encoding: RGB images of one size. Per texel, row by row: `chartIds`, 0 where a
 /// texel is neither read nor changed; `normals`, zero where a texel shall agree with no other; `errors` of the flat map
 /// and of the others, in which those of the result take the place of those given (README); the weights depend on the
-/// flat map's alone. All maps of a texel are averaged with the same weights, so what
+/// flat map's alone. `judges`: the first so many maps tell with the flat one how far texels are apart, at most 6 of
+/// them. All maps of a texel are averaged with the same weights, so what
 /// holds for them linearly (the mean of three RNM maps is the flat one) goes on to hold. A texel without noise keeps
 /// its value among texels that differ from it, but for one factor to all texels and maps of a chart, by which the chart
 /// keeps its flat map's mean luminance. Values that are not finite spread no further than the texel. Parallel and
 /// deterministic. Memory: 6.5 KiB per texel of the page's width.
 void denoise(Image& flat, std::span<Image> encoded, std::span<const std::uint32_t> chartIds,
-             std::span<const CoarseNormal> normals, std::span<const ErrorPlane> errors);
+             std::span<const CoarseNormal> normals, std::span<const ErrorPlane> errors, std::size_t judges = kMostMaps);
 
 }  // namespace lumel

@@ -14,9 +14,13 @@ Conventions describeConventions(const Encoding& encoding) {
   return conventions;
 }
 
+std::size_t statedErrorCount(const Encoding& encoding) {
+  return encoding.source() || encoding.mapNames().front() == kFlatMap ? 0 : encoding.mapCount();
+}
+
 std::vector<std::string> auxChannels(const Encoding& encoding) {
   std::vector<std::string> channels = {"coverage", "validity", "stderr", "samples"};
-  for (std::size_t k = 0; k < encoding.mapCount(); ++k) channels.push_back("stderr" + std::to_string(k));
+  for (std::size_t k = 0; k < statedErrorCount(encoding); ++k) channels.push_back("stderr" + std::to_string(k));
   return channels;
 }
 

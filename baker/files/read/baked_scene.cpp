@@ -1,5 +1,6 @@
 #include "baker/files/read/baked_scene.h"
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 
@@ -109,7 +110,28 @@ Expected<Json> readBakeJson(const fs::path& dir) {
   return json;
 }
 
-Expected<std::shared_ptr<const Encoding>> encodingOf(const Json& bake, const std::string& file) {
+std::vector<std::string> encodingNames(const Json& bake) {
+  std::vector<std::string> names;
+  const Json all = bake.value("encodings", Json::array());
+  if (all.is_array())
+    for (const Json& row : all)
+      if (row.is_object() && row.value("name", Json()).is_string()) names.push_back(row.at("name").get<std::string>());
+  if (!names.empty()) return names;
+  const Json only = bake.value("encoding", Json());
+  const bool isNamed = only.is_object() && only.value("name", Json()).is_string();
+  return {isNamed ? only.at("name").get<std::string>() : "rnm"};
+}
+
+Expected<std::shared_ptr<const Encoding>> encodingOf(const Json& bake, const std::string& file,
+                                                     const std::string& wanted) {
+  const std::vector<std::string> names = encodingNames(bake);
+  const auto found = wanted.empty() ? names.begin() : std::find(names.begin(), names.end(), wanted);
+  if (found == names.end()) {
+    std::string list;
+    for (const std::string& name : names) list += (list.empty() ? "" : ",") + name;
+    return inputError(file + ": the bake holds " + list + " and not " + wanted + "; bake with --encoding " + list +
+                      "," + wanted);
+  }
   const JsonReader root(bake, file);
   std::string name = "rnm";
   if (bake.contains("encoding")) {
@@ -117,7 +139,13 @@ Expected<std::shared_ptr<const Encoding>> encodingOf(const Json& bake, const std
     if (!stated) return stated.error();
     name = *stated;
   }
-  const auto stated = root.at("conventions");
+  auto stated = root.at("conventions");
+  if (found != names.begin()) {
+    name = *found;
+    const JsonReader row(bake.at("encodings")[static_cast<std::size_t>(found - names.begin())], file,
+                     "/encodings/" + std::to_string(found - names.begin()));
+    stated = row.at("conventions");
+  }
   if (!stated) return stated.error();
   Conventions conventions;
   for (const auto& [key, text] : stated->json().items())
@@ -135,7 +163,7 @@ Expected<BakedScene> readBake(const fs::path& dir, const PageExtras& extras) {
   const std::string file = (dir / "bake.json").string();
   const JsonReader root(*json, file);
   BakedScene baked;
-  auto encoding = encodingOf(*json, file);
+  auto encoding = encodingOf(*json, file, extras.encoding);
   if (!encoding) return encoding.error();
   baked.encoding = std::move(*encoding);
   auto scene = loadScene(dir / "scene.glb");

@@ -16,7 +16,7 @@ namespace lumel {
 
 struct BakedScene {
   Scene scene;                                               // scene.glb, with the sky of the bake as its environment
-  std::shared_ptr<const Encoding> encoding = rnmEncoding();  // as bake.json says
+  std::shared_ptr<const Encoding> encoding = rnmEncoding();  // the one that was asked for, as bake.json says
   std::vector<std::vector<Image>> pages;                     // the encoding's maps, page by page
   std::vector<Image> flat;                                   // the flat map, page by page
   std::vector<Image> aux;                                    // what is known of texels (PageExtras), page by page
@@ -30,10 +30,15 @@ Expected<nlohmann::ordered_json> readBakeJson(const std::filesystem::path& dir);
 
 /// The encoding of a bake, of the conventions that bake.json states. A bake without an "encoding" is one of rnm: it was
 /// the only one before there was that key, and differs in nothing else. Errors: Input, naming place and cause.
-Expected<std::shared_ptr<const Encoding>> encodingOf(const nlohmann::ordered_json& bake, const std::string& file);
+/// `name`: of one of the bake's encodings; empty: the first.
+Expected<std::shared_ptr<const Encoding>> encodingOf(const nlohmann::ordered_json& bake, const std::string& file,
+                                                     const std::string& name = {});
+/// The names of all encodings of a bake, the first one first.
+std::vector<std::string> encodingNames(const nlohmann::ordered_json& bake);
 
-/// Which of a page's images are read beside the encoding's maps.
+/// Which encoding's maps are read, the first's unless it is named, and which of a page's images beside them.
 struct PageExtras {
+  std::string encoding{};
   bool flat = false;
   bool aux = false;
   bool volumes = false;  // of the whole bake

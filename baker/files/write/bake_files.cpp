@@ -19,7 +19,12 @@ namespace fs = std::filesystem;
 
 std::map<std::string, std::string> pageMetadata(std::size_t page, const std::string& kind, const BakeRecord& record) {
   std::map<std::string, std::string> metadata;
-  const Encoding& encoding = *record.bakeOptions.encoding;
+  const std::vector<StoredEncoding> all = record.bakeOptions.encoding->stored();
+  const auto has = [&kind](const StoredEncoding& stored) {
+    return std::ranges::find(stored.encoding->mapNames(), kind) != stored.encoding->mapNames().end();
+  };
+  const auto found = std::ranges::find_if(all, has);
+  const Encoding& encoding = found == all.end() ? *all.front().encoding : *found->encoding;
   for (const auto& [key, text] : describeConventions(encoding)) metadata["lumel:" + key] = text;
   metadata["lumel:encoding"] = encoding.name();
   for (const std::string& name : encoding.mapNames())
@@ -51,16 +56,20 @@ struct ImageFile {
   PendingFile file;
   const Image* image;
   WriteImageOptions options;
-  const Image* more = nullptr;  // whose channels come after those of `image`
+  // Whose channels come after those of `image`: as many as have names, from this one on.
+  const Image* more = nullptr;
+  std::size_t firstOfMore = 0;
 };
 
 /// The channels of both, pixel by pixel.
-Image joined(const Image& first, const Image& second) {
-  Image image(first.width, first.height, first.channels + second.channels);
+Image joined(const ImageFile& file) {
+  const Image& first = *file.image;
+  Image image(first.width, first.height, static_cast<int>(file.options.channelNames.size()));
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
       std::copy_n(first.at(x, y), first.channels, image.at(x, y));
-      std::copy_n(second.at(x, y), second.channels, image.at(x, y) + first.channels);
+      std::copy_n(file.more->at(x, y) + file.firstOfMore, image.channels - first.channels,
+                  image.at(x, y) + first.channels);
     }
   return image;
 }
@@ -70,25 +79,29 @@ Expected<void> addPage(FileSet& set, const fs::path& dir, std::size_t page, cons
   WriteImageOptions options;
   options.format = record.half ? PixelFormat::Half : PixelFormat::Float;
   options.noisy = !record.half;
-  const auto add = [&](const std::string& kind, const Image& image, const Image* more = nullptr) -> Expected<void> {
+  const auto add = [&](const std::string& kind, const Image& image, const Image* more = nullptr,
+                       std::size_t firstOfMore = 0) -> Expected<void> {
     options.metadata = pageMetadata(page, kind, record);
     auto file = set.add(dir / pageFileName(page, kind));
     if (!file) return file.error();
-    files.push_back({std::move(*file), &image, options, more});
+    files.push_back({std::move(*file), &image, options, more, firstOfMore});
     return {};
   };
-  const std::vector<std::string>& mapNames = record.bakeOptions.encoding->mapNames();
-  const std::vector<std::string> kinds = lightKinds(mapNames);
-  for (std::size_t i = 0; i < kinds.size(); ++i)
-    if (auto added = add(kinds[i], i < mapNames.size() ? baked.maps[i] : baked.flat); !added) return added;
+  std::size_t map = 0;
+  for (const StoredEncoding& stored : record.bakeOptions.encoding->stored())
+    for (const std::string& kind : stored.encoding->mapNames())
+      if (kind != kFlatMap)
+        if (auto added = add(kind, baked.maps[map++]); !added) return added;
+  if (auto added = add(kFlatMap, baked.flat); !added) return added;
   if (masks != nullptr)
     if (auto added = add("masks", *masks); !added) return added;
   // Sample counts and coverage are exact in float only.
   options.format = PixelFormat::Float;
   options.noisy = false;
   options.mayHoldNan = true;
-  options.channelNames = auxChannels(*record.bakeOptions.encoding);
-  return add("aux", baked.aux, &baked.mapErrors);
+  const StoredEncoding first = record.bakeOptions.encoding->stored().front();
+  options.channelNames = auxChannels(*first.encoding);
+  return add("aux", baked.aux, &baked.mapErrors, first.first);
 }
 
 /// Compression takes most of the time, and a file at a time leaves cores idle.
@@ -98,7 +111,7 @@ Expected<void> writeImages(const std::vector<ImageFile>& files) {
     for (std::size_t i = first; i < last; ++i) {
       const ImageFile& file = files[i];
       done[i] = file.more == nullptr ? writeImage(file.file, *file.image, file.options)
-                                     : writeImage(file.file, joined(*file.image, *file.more), file.options);
+                                     : writeImage(file.file, joined(file), file.options);
     }
   });
   for (Expected<void>& d : done)
@@ -121,7 +134,7 @@ Expected<void> writeBake(const fs::path& dir, const Scene& scene, const AtlasRes
   if (!scene.environment.isBlack() && !scene.environment.image.empty()) {
     auto sky = set->add(dir / "sky.exr");
     if (!sky) return sky.error();
-    files.push_back({std::move(*sky), &scene.environment.image, {}, nullptr});
+    files.push_back({std::move(*sky), &scene.environment.image, {}, nullptr, 0});
   }
   if (auto done = writeImages(files); !done) return done;
   const auto writeFile = [&](const char* name, const auto& bytes) -> Expected<void> {

@@ -17,7 +17,8 @@ using Json = nlohmann::ordered_json;
 
 Json toJson(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 
-Json describePage(std::size_t index, const BakedPage& page, const Encoding& encoding, std::size_t charts) {
+Json describePage(std::size_t index, const BakedPage& page, const std::vector<StoredEncoding>& encodings,
+                  std::size_t charts) {
   std::size_t covered = 0;
   std::size_t invalid = 0;
   double area = 0.0;
@@ -39,8 +40,10 @@ Json describePage(std::size_t index, const BakedPage& page, const Encoding& enco
   const double texels = static_cast<double>(page.aux.width) * static_cast<double>(page.aux.height);
   const Vec3d mean = counted > 0 ? sum / static_cast<double>(counted) : sum;
   Json files = Json::object();
-  for (const std::string& name : encoding.mapNames()) files[encoding.name()].push_back(pageFileName(index, name));
-  files["flat"] = pageFileName(index, "flat");
+  for (const auto& [encoding, first] : encodings)
+    for (const std::string& name : encoding->mapNames())
+      if (encoding->name() != kFlatMap) files[encoding->name()].push_back(pageFileName(index, name));
+  files["flat"] = pageFileName(index, kFlatMap);
   files["aux"] = pageFileName(index, "aux");
   return {{"page", index},
           {"width", page.aux.width},
@@ -54,7 +57,7 @@ Json describePage(std::size_t index, const BakedPage& page, const Encoding& enco
           {"files", std::move(files)}};
 }
 
-Json describePages(const Atlas& atlas, const BakeResult& result, const Encoding& encoding) {
+Json describePages(const Atlas& atlas, const BakeResult& result, const std::vector<StoredEncoding>& encodings) {
   std::vector<std::size_t> charts(result.pages.size(), 0);
   for (const Chart& chart : atlas.charts)
     if (const auto page = static_cast<std::size_t>(atlas.surfaces[static_cast<std::size_t>(chart.surface)].page);
@@ -62,7 +65,7 @@ Json describePages(const Atlas& atlas, const BakeResult& result, const Encoding&
       ++charts[page];
   Json pages = Json::array();
   for (std::size_t i = 0; i < result.pages.size(); ++i)
-    pages.push_back(describePage(i, result.pages[i], encoding, charts[i]));
+    pages.push_back(describePage(i, result.pages[i], encodings, charts[i]));
   return pages;
 }
 
@@ -175,6 +178,18 @@ Json describeEncoding(const Encoding& encoding) {
           {"signed", encoding.isSigned()}};
 }
 
+/// All encodings of the bake, each with the conventions that are its own; "encoding" and "conventions" say the same of
+/// the first alone.
+Json describeEncodings(const std::vector<StoredEncoding>& encodings) {
+  Json rows = Json::array();
+  for (const StoredEncoding& stored : encodings) {
+    Json row = describeEncoding(*stored.encoding);
+    row["conventions"] = stored.encoding->conventions();
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
 Json describeScene(const Scene& scene, const BakeRecord& record) {
   return {{"file", record.sceneFile.string()},
           {"instances", scene.instances.size()},
@@ -266,13 +281,15 @@ std::string describeBake(const Scene& scene, const AtlasResult& atlas, const Bak
                          const BakeRecord& record) {
   std::vector<std::string> warnings = scene.report.warnings;
   warnings.insert(warnings.end(), atlas.report.warnings.begin(), atlas.report.warnings.end());
-  const Encoding& encoding = *record.bakeOptions.encoding;
+  const std::vector<StoredEncoding> encodings = record.bakeOptions.encoding->stored();
+  const Encoding& encoding = *encodings.front().encoding;
   Json json;
   json["format"] = kBakeFormat;
   json["lumel"] = kVersion;
   json["scene"] = describeScene(scene, record);
   json["settings"] = record.settings;
   json["encoding"] = describeEncoding(encoding);
+  json["encodings"] = describeEncodings(encodings);
   json["conventions"] = describeConventions(encoding);
   json["conventions"]["aux"] = describeAuxChannels(encoding);
   json["sky"] = describeSky(scene.environment);
@@ -287,7 +304,7 @@ std::string describeBake(const Scene& scene, const AtlasResult& atlas, const Bak
                    {"objectsWithOwnUvs", atlas.report.objectsWithOwnUvs},
                    {"sceneUvs", describeSceneUvs(atlas.report)},
                    {"layout", describeLayout(atlas.atlas, record.atlasOptions)}};
-  json["pages"] = describePages(atlas.atlas, result, encoding);
+  json["pages"] = describePages(atlas.atlas, result, encodings);
   json["cost"] = {
       {"texels", result.stats.texels}, {"rays", result.stats.rays}, {"shadowRays", result.stats.shadowRays}};
   json["error"] = describeError(result.stats);

@@ -1,0 +1,20 @@
+// What the table of encodings (encodings.cpp) is made of: how each entry is made from conventions that a file states.
+// Keys that are missing have their defaults. For this folder alone.
+#pragma once
+
+#include <string>
+
+#include "lightmap/maps/encoding.h"
+
+namespace lumel {
+
+Expected<std::shared_ptr<const Encoding>> statedRnmEncoding(const Conventions& conventions);
+Expected<std::shared_ptr<const Encoding>> statedSh1Encoding(const Conventions& conventions);
+
+/// What `conventions` says under a key, else the name of the usual choice.
+std::string statedOr(const Conventions& conventions, const char* key, const char* usual);
+
+/// How an encoding that is linear in direction is projected: as it is (Raw), or exact on flat normals (Flat).
+Projection statedExactness(const Conventions& conventions);
+
+}  // namespace lumel
