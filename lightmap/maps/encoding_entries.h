@@ -10,6 +10,10 @@ namespace lumel {
 
 Expected<std::shared_ptr<const Encoding>> statedRnmEncoding(const Conventions& conventions);
 Expected<std::shared_ptr<const Encoding>> statedSh1Encoding(const Conventions& conventions);
+Expected<std::shared_ptr<const Encoding>> statedHBasisEncoding(const Conventions& conventions);
+Expected<std::shared_ptr<const Encoding>> statedZh3Encoding(const Conventions& conventions);
+Expected<std::shared_ptr<const Encoding>> statedAhdEncoding(const Conventions& conventions);
+Expected<std::shared_ptr<const Encoding>> statedDominantEncoding(const Conventions& conventions);
 
 /// What `conventions` says under a key, else the name of the usual choice.
 std::string statedOr(const Conventions& conventions, const char* key, const char* usual);

@@ -27,11 +27,17 @@ struct Entry {
   const char* summary;  // for the help of the command line
   Expected<std::shared_ptr<const Encoding>> (*make)(const Conventions& conventions);
 };
-constexpr std::array<Entry, 3> kEntries = {{
-    {"rnm", "three maps for normal maps and ssbump maps, as in the literature", statedRnmEncoding},
-    {"flat", "one map, the same light on every normal",
-     [](const Conventions&) -> Expected<std::shared_ptr<const Encoding>> { return flatEncoding(); }},
-    {"sh1", "spherical harmonics L0 and L1, four signed maps: what many engines read", statedSh1Encoding},
+Expected<std::shared_ptr<const Encoding>> statedFlatEncoding(const Conventions&) { return flatEncoding(); }
+
+constexpr std::array<Entry, 7> kEntries = {{
+    {"rnm", "3 maps, for normal maps and ssbump maps as in the literature", statedRnmEncoding},
+    {"flat", "1 map, the same light on every normal: surfaces without normal maps", statedFlatEncoding},
+    {"sh1", "4 signed maps, spherical harmonics L0 and L1: what most engines read", statedSh1Encoding},
+    {"h4", "4 signed maps, the H-basis: for their size the closest on normals that lean far", statedHBasisEncoding},
+    {"zh3", "5 signed maps, sh1 and a zonal second band: the closest of all", statedZh3Encoding},
+    {"ahd", "3 maps, ambient light and one light with its direction: crisp under sun and lamps", statedAhdEncoding},
+    {"dominant", "1 map beside the flat one, a direction: cheapest, as Unity's directional mode reads it",
+     statedDominantEncoding},
 }};
 
 }  // namespace
