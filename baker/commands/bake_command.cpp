@@ -357,6 +357,8 @@ Expected<void> runBake(const BakeArguments& a, CommandContext& context) {
   const int dilate = a.dilate == kDilateByPadding ? (a.atlas.padding + 1) / 2 : a.dilate;
   auto encoding = encodingsOf(a.encodings, a.projection);
   if (!encoding) return encoding.error();
+  if (a.bake.seams && !std::ranges::all_of((*encoding)->groups(), [](const MapGroup& g) { return canMend(g.count); }))
+    return usageError("--seams on does not know the maps of zh3; leave one of them out");
   BakeRecord record = recordOf(a, dilate, context.settings);
   record.bakeOptions.encoding = std::move(*encoding);
 

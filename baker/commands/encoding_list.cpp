@@ -1,16 +1,14 @@
 #include "baker/commands/encoding_list.h"
 
-#include <algorithm>
 #include <vector>
+
+#include "scene/base/split_text.h"
 
 namespace lumel {
 
 Expected<std::shared_ptr<const Encoding>> encodingsOf(const std::string& list, Projection projection) {
   std::vector<std::shared_ptr<const Encoding>> encodings;
-  for (std::size_t first = 0; first <= list.size();) {
-    const std::size_t comma = std::min(list.find(',', first), list.size());
-    const std::string name = list.substr(first, comma - first);
-    first = comma + 1;
+  for (const std::string& name : splitText(list, ',')) {
     const auto found = findEncoding(name, {{"projection", nameOf(projection)}});
     if (!found) {
       std::string known;
