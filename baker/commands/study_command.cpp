@@ -1,10 +1,13 @@
 // lumel study: what error a bake of a scene has, and what less of it costs.
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <ostream>
 
+#include "baker/bake/quality.h"
 #include "baker/commands/command.h"
 #include "baker/commands/scene_arguments.h"
+#include "baker/study/study_encodings.h"
 #include "baker/study/study_files.h"
 #include "lightmap/atlas/split_triangles.h"
 #include "scene/base/parallel.h"
@@ -17,6 +20,7 @@ struct StudyArguments : SceneArguments {
   std::filesystem::path output;
   StudyOptions study;
   float timeBudget = 180.0f;
+  bool encodings = false;
   int threads = 0;
 };
 
@@ -30,6 +34,9 @@ void declareOptions(OptionTable& options, StudyArguments& a) {
   declareOutsidePaths(options, a);
   declareSsbump(options, a);
   options.group("Study");
+  options.flag("encodings", a.encodings,
+               "Compare the encodings of lumel bake --encoding instead: size, error on normals that lean, negative "
+               "light and time, into encodings.md and encodings.json");
   options.number("time-budget", a.timeBudget, {0.0f},
                  "Seconds for the whole: half go to the reference; bakes that would end later are left out and named. "
                  "0: no limit");
@@ -51,6 +58,21 @@ void declareOptions(OptionTable& options, StudyArguments& a) {
   options.integer("threads", a.threads, {0, 1024}, "Threads to use, without influence on errors; 0: one per core");
 }
 
+Expected<void> runEncodingStudy(const StudyArguments& a, const Scene& scene, CommandContext& context) {
+  const EncodingStudyOptions options{.atlas = a.study.atlas,
+                                     .bounces = a.study.bounces,
+                                     .projection = a.study.projection,
+                                     .seed = a.study.seed,
+                                     .samples = std::min(a.study.mostSamples, samplesOf(Quality::Production))};
+  const auto result = studyEncodings(scene, options, context.progress);
+  if (!result) return result.error();
+  const std::string name = a.scene.filename().string();
+  if (auto written = writeEncodingStudy(a.output, *result, name, options.samples, context.settings); !written)
+    return written;
+  if (!context.quiet) context.out << encodingStudyMarkdown(*result, name, options.samples);
+  return {};
+}
+
 Expected<void> runStudy(const StudyArguments& a, CommandContext& context) {
   if (auto checked = checkAtlas(a.study.atlas); !checked) return checked;
   if (auto checked = checkSky(a); !checked) return checked;
@@ -62,6 +84,7 @@ Expected<void> runStudy(const StudyArguments& a, CommandContext& context) {
   if (!hasLight(*scene)) return inputError(a.scene.string() + ": nothing in it shines; give --sky-color or --sky");
   if (!context.quiet) printNotes(scene->report.notes);
   if (!context.quiet) printWarnings(scene->report.warnings);
+  if (a.encodings) return runEncodingStudy(a, *scene, context);
   if (!context.quiet) std::fprintf(stderr, "study of %s: a reference, then the candidates\n", a.scene.c_str());
   StudyOptions options = a.study;
   options.timeBudgetSeconds = static_cast<double>(a.timeBudget);
@@ -95,6 +118,8 @@ Command studyCommand() {
       "      three minutes on one page of 128 x 128\n"
       "  lumel study level.glb -o out/study --sky noon.hdr --page-size 512 --time-budget 1800\n"
       "      half an hour on more texels\n"
+      "  lumel study level.gltf -o out/encodings --encodings\n"
+      "      what each encoding costs and loses on this level\n"
       "  lumel study level.glb -o out/study --reference-samples 4096 --time-budget 0\n"
       "      whatever it takes; errors are the same on every machine";
   declareOptions(command.options, *arguments);

@@ -1,7 +1,5 @@
 #include "baker/study/study.h"
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -15,6 +13,7 @@
 #include "baker/light/lit_scene.h"
 #include "baker/study/study_density.h"
 #include "baker/study/study_maps.h"
+#include "baker/study/study_setup.h"
 #include "lightmap/texels/texels.h"
 #include "scene/base/stopwatch.h"
 
@@ -23,8 +22,6 @@ namespace {
 
 /// Candidates have options.seed; these are far from any that people choose.
 constexpr std::uint64_t kReferenceSeed = 0x9e3779b97f4a7c15ull;
-/// Larger pages are tried up to this where charts do not fit the page at any density.
-constexpr int kMostPage = 4096;
 constexpr std::array<int, 2> kPilotSamples = {4, 16};
 constexpr int kLeastReference = 64;
 constexpr int kMostReference = 1 << 16;
@@ -38,15 +35,6 @@ constexpr double kLit = 1e-3;
 constexpr std::array<float, 3> kDensities = {0.25f, 0.5f, 1.0f};
 
 constexpr double kProgressPerSecond = 1e3;
-
-double cpuSecondsNow() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
 
 /// Makes a bake advance the whole study by the time that it was expected to take.
 class ShareOfProgress : public Progress {
@@ -370,12 +358,7 @@ Expected<void> Studying::measureDensity(Candidate& candidate) {
 Expected<void> Studying::makeAtlas() {
   const int asked = options_.atlas.pageSize;
   ShareOfProgress quiet(progress_, 0.0);
-  auto atlas = buildAtlas(scene_, options_.atlas, quiet);
-  while (!atlas && atlas.error().kind == ErrorKind::Usage && options_.atlas.texelsPerMeter == 0.0f &&
-         options_.atlas.pageSize < kMostPage) {
-    options_.atlas.pageSize *= 2;
-    atlas = buildAtlas(scene_, options_.atlas, quiet);
-  }
+  auto atlas = atlasThatFits(scene_, options_.atlas, quiet);
   if (!atlas) return atlas.error();
   if (options_.atlas.pageSize != asked)
     study_.notes.push_back("the charts do not fit a page of " + std::to_string(asked) + "; one of " +
