@@ -36,6 +36,7 @@ Command ssbumpCommand();
 Command renderCommand();
 Command infoCommand();
 Command diffCommand();
+Command convertCommand();
 Command studyCommand();
 
 }  // namespace lumel

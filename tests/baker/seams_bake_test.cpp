@@ -51,6 +51,27 @@ TEST(SeamsOfBakes, TilesUnderAnEvenSkyAreOne) {
       for (int x = 1; x < kTexels + 3; ++x) EXPECT_NEAR(page.flat.rgb(x, y).x, 1.0f, 0.01f) << x << ", " << y;
 }
 
+// Each encoding's seams are mended beside the flat map as they would be alone.
+TEST(SeamsOfBakes, AreMendedInSeveralEncodings) {
+  TestScene test = twoTiles();
+  addGutter(test);
+  test.scene.environment.color = Vec3(1.0f, 0.5f, 0.25f);
+  const auto bakeIn = [&](const std::shared_ptr<const Encoding>& encoding) {
+    BakeResult baked = test.bake({.samples = 16, .adaptive = false, .seams = true, .encoding = encoding});
+    finishPages(baked.pages, test.atlas, findTexels(test.atlas),
+                {.rings = 1, .seams = &baked.seams, .groups = encoding->groups()});
+    return baked;
+  };
+  const BakeResult rnm = bakeIn(rnmEncoding()), sh1 = bakeIn(sh1Encoding());
+  const BakeResult both = bakeIn(*jointEncoding({rnmEncoding(), sh1Encoding()}));
+  for (std::size_t p = 0; p < both.pages.size(); ++p) {
+    ASSERT_EQ(both.pages[p].maps.size(), 7u);
+    EXPECT_EQ(both.pages[p].flat.pixels, rnm.pages[p].flat.pixels);
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(both.pages[p].maps[k].pixels, rnm.pages[p].maps[k].pixels);
+    for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(both.pages[p].maps[3 + k].pixels, sh1.pages[p].maps[k].pixels);
+  }
+}
+
 TEST(SeamsOfBakes, AWallOnTheSeamKeepsItsShadow) {
   for (const bool standing : {true, false}) {
     TestScene test = twoTiles();

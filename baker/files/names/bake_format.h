@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "lightmap/maps/encoding.h"
+
 namespace lumel {
 
 /// Version of the layout of bake.json; a reader refuses others.
@@ -17,5 +19,11 @@ const std::vector<std::string>& chartColumns();
 
 /// The value of one of these columns in a row that has them all.
 const nlohmann::ordered_json& chartColumn(const nlohmann::ordered_json& row, std::string_view name);
+
+/// "encoding" in bake.json: name, maps, domain, signed.
+nlohmann::ordered_json describeEncoding(const Encoding& encoding);
+
+/// The text of bake.json: the long list of charts on a line of its own.
+std::string bakeJsonText(const nlohmann::ordered_json& bake);
 
 }  // namespace lumel

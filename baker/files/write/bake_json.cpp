@@ -171,21 +171,13 @@ Json describeVolumes(const BakeResult& result) {
   return files;
 }
 
-Json describeEncoding(const Encoding& encoding) {
-  return {{"name", encoding.name()},
-          {"maps", encoding.mapNames()},
-          {"domain", nameOf(encoding.domain())},
-          {"signed", encoding.isSigned()}};
-}
-
 /// All encodings of the bake, each with the conventions that are its own; "encoding" and "conventions" say the same of
 /// the first alone.
 Json describeEncodings(const std::vector<StoredEncoding>& encodings) {
   Json rows = Json::array();
   for (const StoredEncoding& stored : encodings) {
-    Json row = describeEncoding(*stored.encoding);
-    row["conventions"] = stored.encoding->conventions();
-    rows.push_back(std::move(row));
+    rows.push_back(describeEncoding(*stored.encoding));
+    rows.back()["conventions"] = stored.encoding->conventions();
   }
   return rows;
 }
@@ -314,19 +306,7 @@ std::string describeBake(const Scene& scene, const AtlasResult& atlas, const Bak
   json["objects"] = describeObjects(scene, atlas.atlas);
   json["charts"] = describeCharts(atlas.atlas);
   json["run"] = describeRun(result.stats, record);
-  // Names come from files and need not be valid UTF-8.
-  const auto dump = [](const Json& value, int indent) {
-    return value.dump(indent, ' ', false, Json::error_handler_t::replace);
-  };
-  // One line per entry of the first level down keeps long lists readable and small.
-  std::string text = "{";
-  const char* separator = "\n";
-  for (const auto& [key, value] : json.items()) {
-    const bool compact = key == "charts";
-    text += separator + dump(Json(key), -1) + ": " + dump(value, compact ? -1 : 2);
-    separator = ",\n";
-  }
-  return text + "\n}\n";
+  return bakeJsonText(json);
 }
 
 }  // namespace lumel
