@@ -13,6 +13,7 @@
 #include "baker/light/lit_scene.h"
 #include "baker/study/study_maps.h"
 #include "baker/study/study_setup.h"
+#include "lightmap/maps/rnm_to_sh.h"
 #include "lightmap/texels/texels.h"
 #include "scene/files/file_set.h"
 
@@ -71,6 +72,29 @@ class IrradianceOnNormals : public Encoding {
   }
 
   std::vector<Vec3> normals_;
+};
+
+/// sh1 as lumel convert makes it.
+class ConvertedSh1 : public Encoding {
+ public:
+  ConvertedSh1()
+      : Encoding({.name = "sh1 converted",
+                  .mapNames = sh1Encoding()->mapNames(),
+                  .isSigned = true,
+                  .conventions = sh1Encoding()->conventions(),
+                  .source = rnmEncoding(Projection::Raw)}),
+        sh1_(sh1Encoding()) {}
+
+  MapKernels kernels(const Vec3& dirTangent) const override { return source()->kernels(dirTangent); }
+  void derive(std::span<const Vec3> rnm, const Vec3& flat, std::span<Vec3> maps) const override {
+    std::ranges::copy(sh1FromRawRnm({rnm[0], rnm[1], rnm[2]}, flat), maps.begin());
+  }
+  Vec3 decode(std::span<const Vec3> maps, const Vec3& normalTangent) const override {
+    return sh1_->decode(maps, normalTangent);
+  }
+
+ private:
+  std::shared_ptr<const Encoding> sh1_;
 };
 
 /// Sums over texels, normals and colours.
@@ -211,6 +235,8 @@ Expected<EncodingStudy> Studying::run() {
     if (auto done = measure(*encoding, summary.name); !done) return done.error();
     if (summary.name == "rnm" && options_.projection != Projection::Signed)
       if (auto done = measure(rnmEncoding(Projection::Signed), "rnm signed"); !done) return done.error();
+    if (summary.name == "sh1")
+      if (auto done = measure(std::make_shared<ConvertedSh1>(), "sh1 converted"); !done) return done.error();
   }
   return std::move(study_);
 }

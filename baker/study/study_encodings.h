@@ -27,7 +27,7 @@ struct EncodingStudyOptions {
 /// One encoding. Errors are root mean squares over RGB of covered, valid texels and over normals, relative to that of
 /// the truth.
 struct EncodingFigures {
-  std::string name;         // with the projection where there are several: "rnm signed"
+  std::string name;         // with a word where there are several: "rnm signed", "sh1 converted" (lumel convert)
   std::size_t maps = 0;     // that readers need, RGB, the flat one too where they read it
   double within30 = 0.0;    // normals within 30 degrees of the texel's, evenly by solid angle
   double within60 = 0.0;    // within 60
