@@ -101,8 +101,8 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
       "How light is spread over the maps of rnm. flat: exact on flat normals, for gentle normal maps; under "
       "grazing light a bump that faces it gets .27 where .50 is right. raw: clamped dots, .48 there, but .58 "
       "to .79 of the light of flat normals. fit: least squares for normals within 30 degrees, exact on flat "
-      "ones. signed: plain dots, maps may be negative, to be decoded with linear weights. Of the other encodings raw "
-      "are plain projections, the rest exact on flat normals");
+      "ones. signed: plain dots, maps may be negative, to be decoded with linear weights. Other encodings are exact on "
+      "flat normals, but for raw, plain bands; fit makes sh1 the nearest to irradiance for readers of L0 + N.L");
   options.choice(
       "audit", a.audit, {"auto", "on", "off"},
       "Path trace texels drawn at random and compare them with the finished maps: finds light that is wrong, "

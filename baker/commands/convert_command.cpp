@@ -143,9 +143,8 @@ Expected<void> runConvert(const ConvertArguments& a, CommandContext& context) {
   if (auto done = writeBytes(*file, bakeJsonText(*bake)); !done) return done;
   if (auto done = set.commit(); !done) return done;
   if (!context.quiet)
-    std::fprintf(stderr, "%s: %s added to %zu page%s, an approximation of what --encoding %s samples\n", a.bake.c_str(),
-                 encoding->name().c_str(), bake->at("pages").size(), bake->at("pages").size() == 1 ? "" : "s",
-                 encoding->name().c_str());
+    std::fprintf(stderr, "%s: %s added to %zu page%s\n", a.bake.c_str(), encoding->name().c_str(),
+                 bake->at("pages").size(), bake->at("pages").size() == 1 ? "" : "s");
   return {};
 }
 
@@ -157,10 +156,9 @@ Command convertCommand() {
   command.name = "convert";
   command.summary = "Add maps of another encoding to a bake, from those that it has";
   command.examples =
-      "From the rnm maps of a bake with --projection raw and its flat map, without rays. Two bands that agree with "
-      "the\n"
-      "four irradiances that these know are close where light is even, and off where it comes from one direction\n"
-      "(lightmap/maps/encodings.md has figures): where you can, bake with --encoding rnm,sh1 instead.\n"
+      "From the rnm maps of a bake with --projection raw and its flat map, without rays: what agrees with the four\n"
+      "irradiances that these know. For readers that decode L0 + N.L it is as good as what --encoding sh1 samples, or\n"
+      "better (lightmap/maps/encodings.md has figures); for readers that take L0 and L for radiance it is not.\n"
       "\n"
       "Examples:\n"
       "  lumel convert out/level --to sh1\n"

@@ -235,8 +235,12 @@ Expected<EncodingStudy> Studying::run() {
     if (auto done = measure(*encoding, summary.name); !done) return done.error();
     if (summary.name == "rnm" && options_.projection != Projection::Signed)
       if (auto done = measure(rnmEncoding(Projection::Signed), "rnm signed"); !done) return done.error();
-    if (summary.name == "sh1")
+    if (summary.name == "sh1") {
+      const auto fitted = findEncoding("sh1", {{"projection", nameOf(Projection::Fit)}});
+      if (!fitted) return fitted.error();
+      if (auto done = measure(*fitted, "sh1 fit"); !done) return done.error();
       if (auto done = measure(std::make_shared<ConvertedSh1>(), "sh1 converted"); !done) return done.error();
+    }
   }
   return std::move(study_);
 }

@@ -15,6 +15,9 @@ Expected<std::shared_ptr<const Encoding>> statedZh3Encoding(const Conventions& c
 Expected<std::shared_ptr<const Encoding>> statedAhdEncoding(const Conventions& conventions);
 Expected<std::shared_ptr<const Encoding>> statedDominantEncoding(const Conventions& conventions);
 
+/// sh1 as the line L0 + N.L that is the nearest to irradiance over the hemisphere of normals, exact on flat ones.
+std::shared_ptr<const Encoding> fittedSh1Encoding();
+
 /// What `conventions` says under a key, else the name of the usual choice.
 std::string statedOr(const Conventions& conventions, const char* key, const char* usual);
 

@@ -51,18 +51,16 @@ LUMEL_FOR_EACH_CPU void fits(const float* x, const float* y, const float* z, Ker
     fitOf(x[lane], y[lane], z[lane], lanes.of[0][lane], lanes.of[1][lane], lanes.of[2][lane], lanes.of[3][lane]);
 }
 
-/// What is sampled for h4: a and b of the line a + b.n that is the nearest to irradiance / pi over the hemisphere, a
-/// scalar and a vector as sh1's. Exact on flat normals unless it is raw: b.z = flat - a.
+/// What is sampled for h4, and sh1 of projection fit: a and b of the line a + b.n that is the nearest to irradiance /
+/// pi over the hemisphere, a scalar and a vector as sh1's, which readers decode alike. Exact on flat normals unless it
+/// is raw: b.z = flat - a.
 class HemisphereLine : public Encoding {
  public:
-  explicit HemisphereLine(Projection projection)
-      : Encoding({.name = "line",
-                  .mapNames = {"line-0", "line-x", "line-y", "line-z"},
+  HemisphereLine(const std::string& name, Projection projection)
+      : Encoding({.name = name,
+                  .mapNames = {name + "-0", name + "-x", name + "-y", name + "-z"},
                   .isSigned = true,
-                  .conventions = {{"basis", "1 and x, y, z of a unit vector in tangent space (t, b, n)"},
-                                  {"order", "maps 0 to 3: a, b.x, b.y, b.z"},
-                                  {"decode", "line"},
-                                  {"decodeFormula", "L = max(0, a + N.b)"}}}),
+                  .conventions = conventionsOf(projection)}),
         isExactOnFlat_(projection != Projection::Raw) {}
 
   MapKernels kernels(const Vec3& dirTangent) const override {
@@ -81,6 +79,12 @@ class HemisphereLine : public Encoding {
   }
 
  private:
+  static Conventions conventionsOf(Projection projection) {
+    Conventions conventions = sh1Encoding()->conventions();
+    conventions["projection"] = nameOf(projection);
+    return conventions;
+  }
+
   bool isExactOnFlat_;
 };
 
@@ -98,7 +102,7 @@ class HBasisEncoding : public Encoding {
                              {"decode", "h4"},
                              {"decodeFormula", "L = max(0, sum_i Hi(N) map_i)"},
                              {"projection", nameOf(projection)}},
-             .source = std::make_shared<HemisphereLine>(projection)}) {}
+             .source = std::make_shared<HemisphereLine>("line", projection)}) {}
 
   MapKernels kernels(const Vec3& dirTangent) const override { return source()->kernels(dirTangent); }
   void derive(std::span<const Vec3> line, const Vec3&, std::span<Vec3> maps) const override {
@@ -118,6 +122,8 @@ class HBasisEncoding : public Encoding {
 };
 
 }  // namespace
+
+std::shared_ptr<const Encoding> fittedSh1Encoding() { return std::make_shared<HemisphereLine>("sh1", Projection::Fit); }
 
 Expected<std::shared_ptr<const Encoding>> statedHBasisEncoding(const Conventions& conventions) {
   return std::shared_ptr<const Encoding>(std::make_shared<HBasisEncoding>(statedExactness(conventions)));

@@ -20,8 +20,8 @@ std::array<Vec3, 4> sh1FromRawRnm(const std::array<Vec3, 3>& rnm, const Vec3& fl
   std::array<Vec3, 4> sh1{constant, x, y, Vec3(0.0f)};
   for (int c = 0; c < 3; ++c) {
     // |flat - L0| <= k L0 is L0 >= flat / (1 + k); a negative L.z is no more than L0.
-    const float least = std::max({flat[c] / (1.0f + kMostOfConstant), std::abs(x[c]) / kMostOfConstant,
-                                  std::abs(y[c]) / kMostOfConstant});
+    const float least = std::max(
+        {flat[c] / (1.0f + kMostOfConstant), std::abs(x[c]) / kMostOfConstant, std::abs(y[c]) / kMostOfConstant});
     sh1[0][c] = std::max(constant[c], least);
     sh1[3][c] = flat[c] - sh1[0][c];
   }

@@ -58,6 +58,7 @@ std::shared_ptr<const Encoding> sh1Encoding(Projection projection) {
 }
 
 Expected<std::shared_ptr<const Encoding>> statedSh1Encoding(const Conventions& conventions) {
+  if (statedOr(conventions, "projection", "") == nameOf(Projection::Fit)) return fittedSh1Encoding();
   return sh1Encoding(statedExactness(conventions));
 }
 

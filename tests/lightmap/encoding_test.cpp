@@ -18,7 +18,8 @@ std::shared_ptr<const Encoding> made(const std::string& name, Projection project
 }
 
 std::vector<std::shared_ptr<const Encoding>> allEncodings() {
-  std::vector<std::shared_ptr<const Encoding>> all = {rnmEncoding(Projection::Fit), rnmEncoding(Projection::Signed)};
+  std::vector<std::shared_ptr<const Encoding>> all = {rnmEncoding(Projection::Fit), rnmEncoding(Projection::Signed),
+                                                      made("sh1", Projection::Fit)};
   for (const EncodingSummary& summary : encodingSummaries())
     for (const Projection projection : {Projection::Raw, Projection::Flat})
       all.push_back(made(summary.name, projection));
@@ -182,6 +183,11 @@ TEST(Encoding, OneLightFromTheZenithFortyFiveDegreesAndGrazing) {
       const double a = 1 + z - 2 / std::numbers::pi * (left * z + x);
       return a + n.x * left / std::numbers::pi * x + n.z * (z - a);
     });
+    expectDecoded(*made("sh1", Projection::Fit), [&](const Vec3d& n) {
+      const double left = std::numbers::pi - theta;
+      const double a = 1 + z - 2 / std::numbers::pi * (left * z + x);
+      return a + n.x * left / std::numbers::pi * x + n.z * (z - a);
+    });
     // Squared weights of three maps, which add up to three times the flat one.
     expectDecoded(*rnmEncoding(), [&](const Vec3d& n) {
       double sum = 0, of = 0, weights = 0;
@@ -341,6 +347,9 @@ TEST(Encoding, SeveralAreSampledOnceAndStoredAsEachAlone) {
   EXPECT_EQ((*jointEncoding({rnm, flatEncoding()}))->mapCount(), 3u);
   EXPECT_EQ((*jointEncoding({made("ahd")}))->mapCount(), 4u);
   EXPECT_EQ((*jointEncoding({rnm, made("sh1")}))->stored()[1].first, 3u);
+  // What is sampled alike is sampled once, and maps of one name that are not are not taken for each other.
+  EXPECT_EQ((*jointEncoding({made("sh1", Projection::Fit), made("h4")}))->mapCount(), 4u);
+  EXPECT_EQ((*jointEncoding({made("sh1", Projection::Fit), made("ahd")}))->mapCount(), 8u);
 }
 
 /// Sampled by quadrature: maps of raw rnm and the flat one, and what conversion makes of them.
