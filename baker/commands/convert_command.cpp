@@ -112,8 +112,10 @@ Expected<std::shared_ptr<const Encoding>> rawRnmOf(const Json& bake, const fs::p
   if (projection != nameOf(Projection::Raw))
     return inputError(file + ": its rnm maps are of projection " + projection +
                       ", and the conversion needs raw ones; bake with --projection raw, or with --encoding rnm,sh1");
-  if (!bake.contains("pages") || !bake.at("pages").is_array())
-    return inputError(file + ": /pages is not a list; bake again");
+  const Json pages = bake.value("pages", Json());
+  const auto hasFiles = [](const Json& page) { return page.is_object() && page.value("files", Json()).is_object(); };
+  if (!pages.is_array() || !std::all_of(pages.begin(), pages.end(), hasFiles))
+    return inputError(file + ": /pages is not a list of pages with files; bake again");
   return rnm;
 }
 
