@@ -114,9 +114,12 @@ Expected<void> gatherPass(const GatherScene& scene, GatherState& state, std::siz
     if (!known.done && known.samples >= end) return;
     if (!known.done) {
       const std::span buried = std::span(state.buried).subspan(wave.start, wave.count);
+      // Without bounces they change from pass to pass.
+      std::span<const float> places;
+      if (scene.levels.count > 0) places = std::span(state.places).subspan(wave.start, wave.count);
       if (first == 0 || std::ranges::count(buried, 0) > 0) {
         GatherWave texels(scene, wave.page, wave.first, wave.count);
-        texels.gather(first, end, state.radiance, buried, state.spreadsOf(scene, w), done);
+        texels.gather(first, end, state.radiance, buried, places, state.spreadsOf(scene, w), done);
         for (std::size_t i = 0; i < wave.count; ++i) state.coverage[wave.start + i] = texels.coverage(i);
       }
       store(scene, state, w, done, first, end);
