@@ -25,16 +25,17 @@ struct BakeOptions {
   // texels that take all.
   bool adaptive = true;
   int bounces = kAllBounces;  // indirect bounces; 0 = direct light only
-  // Gather alone: sampling goes on until the relative standard error of the worst map is so small at 95% of the texels,
-  // or `maxSamples` are taken; texels darker than a tenth of the mean are judged as if they were so bright. 0: off.
+  // Gather alone: sampling goes on until the relative standard error of the worst map is so small at 95% of the texels
+  // around, or `maxSamples` are taken; texels darker than a tenth of the place that lights them are judged as if they
+  // were so bright. 0: off.
   float targetError = 0.0f;
   int maxSamples = 16384;
   // Gather alone: no pass is begun that would end later than this; 0: none. The only option whose result depends on
   // the machine.
   float timeBudgetSeconds = 0.0f;
   bool indirectOnly = false;  // without what arrives straight from lights, shining surfaces and the sky
-  // Find where lookups from both sides of charts' borders shall agree. Exact for tiles; on levels with few texels a chart
-  // it moves partly covered ones too far.
+  // Find where lookups from both sides of charts' borders shall agree. Exact for tiles; on levels with few texels a
+  // chart it moves partly covered ones too far.
   bool seams = false;
   std::uint64_t seed = 1;
   std::shared_ptr<const Encoding> encoding = rnmEncoding();  // jointEncoding for several

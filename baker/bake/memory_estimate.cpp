@@ -14,9 +14,9 @@ namespace {
 constexpr double kBase = 145e6;
 
 // Bytes per covered texel and per texel of the pages, and what is resident then.
-// Sampling: places 16, the flat map's sums 12, reflectance 8, cache 8, counts 22, errors 13, figures of waves 10; the
-// map from pages to texels. The warm-up before it takes less: its links are 32.
-constexpr double kSamplingPerCovered = 89.0;
+// Sampling: places 16, the flat map's sums 12, reflectance 8, cache 8, counts 22, errors 13, light of places 4,
+// figures of waves 11; the map from pages to texels. The warm-up before it takes less: its links are 32.
+constexpr double kSamplingPerCovered = 94.0;
 constexpr double kSamplingPerPageTexel = 0.5;
 // Finishing: places; the flat and the aux image 28, what the denoiser knows of texels and its strips 13, charts and
 // masks.

@@ -75,8 +75,8 @@ void declareLightOptions(OptionTable& options, BakeArguments& a) {
                  "the same number everywhere");
   options.share("target-error", a.bake.targetError, {0.0f, 0.5f},
                 "Sample each part of a page until the relative standard error of its light is so small (1% or 0.01); "
-                "done when 95% of the texels are. Texels darker than a tenth of the mean count as so bright. 0: off, "
-                "the same number of rays everywhere");
+                "done where 95% of the texels are. Texels darker than a tenth of the place that lights them count as "
+                "so bright. 0: off, the same number of rays everywhere");
   options.integer("max-samples", a.bake.maxSamples, {1, 1 << 24},
                   "Most gather rays per texel with --target-error, whether it is met or not");
   options.number("time-budget", a.bake.timeBudgetSeconds, {0.0f},

@@ -13,6 +13,9 @@ namespace {
 /// that itself still moves, and outliers that come late.
 constexpr double kSlowest = 0.85;
 constexpr double kFastest = 2.0;
+/// A place is darker than those around it where the square of its light is less than this share of theirs: within a
+/// room places differ by less.
+constexpr double kDarkerPlace = 0.25;
 
 }  // namespace
 
@@ -61,14 +64,23 @@ void DoublingError::addMaps(const Waves& waves, std::size_t index, const MapMean
     }
 }
 
-void DoublingError::endPass(const Waves& waves, const std::vector<std::uint8_t>& live) {
+void DoublingError::endPass(const Waves& waves, const std::vector<std::uint8_t>& live, std::span<const float> places) {
   double before = 0.0;
   double now = 0.0;
-  for (std::size_t w = 0; w < waves.size(); ++w)
-    if (const auto& known = ofWaves[w]; live[w] && known.movedBefore >= 0.0) {
-      before += known.movedBefore;
-      now += known.moved;
+  for (std::size_t w = 0; w < waves.size(); ++w) {
+    OfWave& known = ofWaves[w];
+    if (!live[w]) continue;
+    if (!places.empty()) {
+      known.place = 0.0;
+      for (const float place : places.subspan(waves[w].start, waves[w].count))
+        known.place += static_cast<double>(place) * static_cast<double>(place) / waves[w].count;
     }
+    if (!(known.movedBefore >= 0.0 && known.place > 0.0)) continue;
+    // Texels that move by a quarter of their place's light and more have it from a few rays, and outweigh all others.
+    if (!places.empty() && std::max(known.movedBefore, known.moved) > known.place) continue;
+    before += known.movedBefore / known.place;
+    now += known.moved / known.place;
+  }
   if (before > 0.0 && now > 0.0) rate = std::clamp(std::log2(before / now), kSlowest, kFastest);
   const double factor = std::pow(std::exp2(rate) - 1.0, -credit);
   for (std::size_t w = 0; w < waves.size(); ++w) {
@@ -87,23 +99,30 @@ void DoublingError::endPass(const Waves& waves, const std::vector<std::uint8_t>&
   }
   parallelFor(waves.size(), 256, [&](std::size_t first, std::size_t last) {
     for (std::size_t w = first; w < last; ++w)
-      if (live[w] && ofWaves[w].doublings > 0) ofWaves[w].pool = poolAround(waves, w);
+      if (live[w] && ofWaves[w].doublings > 0) pool(waves, w);
   });
 }
 
-double DoublingError::poolAround(const Waves& waves, std::size_t index) const {
-  const std::uint32_t samples = ofWaves[index].samples;
-  double pooled = 0.0;
+void DoublingError::pool(const Waves& waves, std::size_t index) {
+  OfWave& known = ofWaves[index];
+  double pooled = 0.0, place = 0.0;
   double texels = 0.0;
   for (const std::uint32_t w : waves.around(index)) {
     if (w == Waves::kNone || ofWaves[w].doublings == 0) continue;
     const OfWave& near = ofWaves[w];
     // A wave that was done earlier has fewer samples.
-    const double fall = near.samples == samples ? 1.0 : std::pow(static_cast<double>(near.samples) / samples, rate);
+    const double fall =
+        near.samples == known.samples ? 1.0 : std::pow(static_cast<double>(near.samples) / known.samples, rate);
     pooled += near.meanSquare * near.counting * fall;
+    place += near.place * near.counting;
     texels += near.counting;
   }
-  return texels > 0.0 ? pooled / texels : 0.0;
+  known.pool = texels > 0.0 ? pooled / texels : 0.0;
+  known.poolPlace = texels > 0.0 ? place / texels : 0.0;
+}
+
+double DoublingError::OfWave::shareOfPool(double light) const {
+  return light * light < kDarkerPlace * poolPlace ? light * light / (kDarkerPlace * poolPlace) : 1.0;
 }
 
 /// `own`: of the texel's d^2, `pool`: mean d^2 of the neighbourhood.
@@ -114,12 +133,15 @@ double DoublingError::error(const OfWave& known, double factor, double own, doub
   return std::sqrt(factor * moved);
 }
 
-float DoublingError::standardError(const Waves& waves, std::size_t index, std::size_t i) const {
+float DoublingError::standardError(const Waves& waves, std::size_t index, std::size_t i,
+                                   std::span<const float> places) const {
   const OfWave& known = ofWaves[index];
-  return static_cast<float>(error(known, known.factor, static_cast<double>(sums[waves[index].start + i]), known.pool));
+  const std::size_t t = waves[index].start + i;
+  const double pool = places.empty() ? known.pool : known.pool * known.shareOfPool(static_cast<double>(places[t]));
+  return static_cast<float>(error(known, known.factor, static_cast<double>(sums[t]), pool));
 }
 
-std::vector<float> DoublingError::takeMapErrors(const Waves& waves, std::size_t maps) {
+std::vector<float> DoublingError::takeMapErrors(const Waves& waves, std::size_t maps, std::span<const float> places) {
   // Per wave, the sums of its texels that count, in the units of one d^2.
   std::vector<std::array<double, kMostMaps>> ofWave(waves.size());
   parallelFor(waves.size(), 256, [&](std::size_t first, std::size_t last) {
@@ -146,12 +168,14 @@ std::vector<float> DoublingError::takeMapErrors(const Waves& waves, std::size_t 
         texels += ofWaves[near].counting;
       }
       const double factor = std::pow(ofWaves[w].factor, kMapCredit);
-      for (std::size_t t = waves[w].start; t < waves[w].start + waves[w].count; ++t)
+      for (std::size_t t = waves[w].start; t < waves[w].start + waves[w].count; ++t) {
+        const double share = places.empty() ? 1.0 : ofWaves[w].shareOfPool(static_cast<double>(places[t]));
         for (std::size_t k = 0; k < maps; ++k) {
           float& value = errors[t * maps + k];
           value = static_cast<float>(
-              error(ofWaves[w], factor, static_cast<double>(value), texels > 0.0 ? pool[k] / texels : 0.0));
+              error(ofWaves[w], factor, static_cast<double>(value), texels > 0.0 ? share * pool[k] / texels : 0.0));
         }
+      }
     }
   });
   return errors;

@@ -27,6 +27,11 @@ namespace lumel {
 /// moved more than they did: at the border of a shadow it knows better. Measured (four scenes, 32 to 1024 samples):
 /// baker/README.md.
 ///
+/// Texels beside each other on a page may be of places that share no light, one a million times as bright as the other.
+/// So a texel whose place is darker than those around it takes less from them, by the square of `places`: per texel,
+/// the light of its place (GatherState::places); empty: all are alike. For the rate each wave counts relative to its
+/// own.
+///
 /// The maps of an encoding have their own d^2; the rate is the flat map's, since they are of the same samples, and half
 /// as much credit again is taken (kMapCredit): with the flat map's, 97 to 98.4% of a Cornell box's texels lay within
 /// their intervals (lightmap/maps/README.md has the figures with it).
@@ -50,12 +55,12 @@ struct DoublingError {
   void addMaps(const Waves& waves, std::size_t wave, const MapMeans& before, const MapMeans& now, std::uint32_t n0,
                std::uint32_t n1, std::uint32_t leftOut = 0);
   /// Ends a pass in which every wave of `live` was added with the same n0 and n1: measures the rate, renews the errors.
-  void endPass(const Waves& waves, const std::vector<std::uint8_t>& live);
+  void endPass(const Waves& waves, const std::vector<std::uint8_t>& live, std::span<const float> places = {});
 
   /// Returns the standard error of the mean over all samples of the wave's texel `i`; NaN before the first doubling.
-  float standardError(const Waves& waves, std::size_t wave, std::size_t i) const;
+  float standardError(const Waves& waves, std::size_t wave, std::size_t i, std::span<const float> places = {}) const;
   /// Turns `mapSums`, of `maps` maps, into such standard errors; nothing can be added after that.
-  std::vector<float> takeMapErrors(const Waves& waves, std::size_t maps);
+  std::vector<float> takeMapErrors(const Waves& waves, std::size_t maps, std::span<const float> places = {});
 
   /// What is known of the texels of a wave.
   struct OfWave {
@@ -67,7 +72,12 @@ struct DoublingError {
     double movedBefore = -1.0;
     double meanSquare = 0.0;  // mean d^2 over the texels and doublings
     double pool = 0.0;        // the same of the neighbourhood
+    double place = 1.0;       // mean square of the places' light
+    double poolPlace = 1.0;   // the same of the neighbourhood
     double factor = 1.0;      // variance / mean d^2
+
+    /// Share of its neighbourhood's mean d^2 that a texel in a place of that light takes.
+    double shareOfPool(double light) const;
   };
   static constexpr float kLeftOut = -1.0f;
   std::vector<OfWave> ofWaves;
@@ -78,7 +88,7 @@ struct DoublingError {
   double rate = 1.2;  // until it is measured: what scenes have at 16 samples
 
  private:
-  double poolAround(const Waves& waves, std::size_t wave) const;
+  void pool(const Waves& waves, std::size_t wave);
   static double error(const OfWave& known, double factor, double own, double pool);
 };
 

@@ -132,7 +132,7 @@ Expected<void> GatherIntegrator::gatherOpenPass(GatherState& state, Progress& pr
 bool GatherIntegrator::isDone(GatherState& state) const {
   if (options_.targetError > 0.0f)
     return state.samples >= std::max(kFirstJudged, static_cast<std::uint32_t>(options_.samples)) &&
-           markDone(scene_, options_, state) >= kTargetShare;
+           markDone(scene_, options_, state);
   if (options_.adaptive && state.samples >= kFirstJudged && state.samples < mostSamples())
     markDone(scene_, options_, state);
   return false;
@@ -152,7 +152,7 @@ TexelLight GatherIntegrator::takeLight(GatherState& state) const {
 
 std::vector<float> GatherIntegrator::takeMapErrors(GatherState& state) const {
   const std::size_t maps = scene_.encoding.mapCount();
-  std::vector<float> errors = state.errors.takeMapErrors(waves_, maps);
+  std::vector<float> errors = state.errors.takeMapErrors(waves_, maps, state.places);
   parallelFor(waves_.texels(), kTexelGrain, [&](std::size_t first, std::size_t last) {
     for (std::size_t t = first; t < last; ++t)
       for (std::size_t k = 0; k < maps; ++k)

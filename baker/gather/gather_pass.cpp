@@ -15,8 +15,8 @@ constexpr std::size_t kTexelGrain = 4096;
 /// Whether more or less than half of a texel's rays meet backs is certain where the lead squared, in rays, is this many
 /// times their number: 2.8 standard deviations of a fair coin, and what eight rays of eight have.
 constexpr double kCertain = 8.0;
-/// Inside of something whose chart nobody sees texels darker than this share of the mean need no more samples.
-constexpr double kDarkInside = 0.01;
+/// Inside of something whose chart nobody sees texels no brighter than this share of their place need no more samples.
+constexpr float kDarkInside = 0.01f;
 
 float square(float x) { return x * x; }
 
@@ -74,6 +74,26 @@ void store(const GatherScene& scene, GatherState& state, std::size_t index, cons
   state.waves[index].samples = end;
 }
 
+/// Mean luminance of the waves around one.
+float lightAround(const GatherScene& scene, const GatherState& state, std::size_t wave) {
+  double light = 0.0, texels = 0.0;
+  for (const std::uint32_t near : scene.waves.around(wave)) {
+    if (near == Waves::kNone) continue;
+    for (std::size_t t = scene.waves[near].start; t < scene.waves[near].start + scene.waves[near].count; ++t)
+      light += static_cast<double>(luminance(state.meanLight(t)));
+    texels += scene.waves[near].count;
+  }
+  return static_cast<float>(light / texels);
+}
+
+/// Without bounces nothing is known of what a texel sees.
+void findPlacesAround(const GatherScene& scene, GatherState& state) {
+  parallelFor(scene.waves.size(), kTexelGrain / kLanes, [&](std::size_t first, std::size_t last) {
+    for (std::size_t w = first; w < last; ++w)
+      std::fill_n(state.places.begin() + scene.waves[w].start, scene.waves[w].count, lightAround(scene, state, w));
+  });
+}
+
 /// Irradiance / pi as of level `level`, from all samples so far.
 Vec3 lightOf(const GatherScene& scene, const GatherState& state, std::size_t texel, std::size_t level) {
   const Vec3& sum = scene.levels.endless ? state.sums.flat[texel] : state.levelSums[texel * scene.stored() + level];
@@ -94,9 +114,12 @@ Expected<void> gatherPass(const GatherScene& scene, GatherState& state, std::siz
     if (!known.done && known.samples >= end) return;
     if (!known.done) {
       const std::span buried = std::span(state.buried).subspan(wave.start, wave.count);
+      // Without bounces they change from pass to pass.
+      std::span<const float> places;
+      if (scene.levels.count > 0) places = std::span(state.places).subspan(wave.start, wave.count);
       if (first == 0 || std::ranges::count(buried, 0) > 0) {
         GatherWave texels(scene, wave.page, wave.first, wave.count);
-        texels.gather(first, end, state.radiance, buried, state.spreadsOf(scene, w), done);
+        texels.gather(first, end, state.radiance, buried, places, state.spreadsOf(scene, w), done);
         for (std::size_t i = 0; i < wave.count; ++i) state.coverage[wave.start + i] = texels.coverage(i);
       }
       store(scene, state, w, done, first, end);
@@ -111,10 +134,11 @@ void closePass(const GatherScene& scene, GatherState& state) {
   std::stable_sort(state.nonFinite.begin() + static_cast<std::ptrdiff_t>(state.closedNonFinite), state.nonFinite.end(),
                    [](const auto& a, const auto& b) { return a.wave < b.wave; });
   state.closedNonFinite = state.nonFinite.size();
+  if (scene.levels.count == 0) findPlacesAround(scene, state);
   findBuried(scene, state);
   std::vector<std::uint8_t> live(state.waves.size());
   for (std::size_t w = 0; w < live.size(); ++w) live[w] = state.waves[w].done ? 0 : 1;
-  state.errors.endPass(scene.waves, live);
+  state.errors.endPass(scene.waves, live, state.places);
 }
 
 std::vector<TexelMap::Substitute> substitutesFor(const GatherScene& scene, const GatherState& state) {
@@ -162,10 +186,9 @@ void findBuried(const GatherScene& scene, GatherState& state) {
     valid[t] = certain && lead < 0.0 ? 1 : 0;
   }
   const std::vector<std::uint8_t> replaced = scene.map.buried(hidden, valid);
-  const double dark = state.meanLuminance(kDarkInside);
   for (std::size_t t = 0; t < hidden.size(); ++t) {
     const bool judged = hidden[t] && state.samplesOf[t] >= kFirstJudged;
-    if (replaced[t] || (judged && static_cast<double>(luminance(state.meanLight(t))) < dark)) state.buried[t] = 1;
+    if (replaced[t] || (judged && luminance(state.meanLight(t)) <= kDarkInside * state.places[t])) state.buried[t] = 1;
   }
 }
 

@@ -84,6 +84,7 @@ void visitMembers(State& s, Visit visit) {
   visit(s.reflectance);
   visit(s.radiance);
   visit(s.uneven);
+  visit(s.places);
   visit(s.direct);
   visit(s.seen);
   visit(s.rays);
@@ -167,6 +168,7 @@ GatherState::GatherState(const GatherScene& scene) : waves(scene.waves.size()), 
   samplesOf.resize(count);
   covers.resize(count);
   buried.resize(count);
+  places.resize(count);
   if (scene.levels.count == 0) return;
   reflectance.resize(count);
   if (!scene.levels.endless) radiance.resize(count * scene.stored());  // else it is what the warm-up ends with
@@ -203,9 +205,9 @@ bool GatherState::fits(const GatherScene& scene) const {
   const auto has = [](const auto& values, std::size_t wanted) { return values.size() == wanted; };
   bool fit = has(waves, scene.waves.size()) && has(errors.ofWaves, scene.waves.size()) && has(errors.squares, count) &&
              has(errors.sums, count) && has(backFaces, count) && has(samplesOf, count) && has(covers, count) &&
-             has(buried, count) && has(reflectance, cached) && has(direct, shining) && has(seen, shining) &&
-             has(sums.flat, summed) && has(coverage, summed) && has(probes, isWarm ? scene.waves.probes() : 0) &&
-             has(uneven, isWarm ? cached : 0);
+             has(buried, count) && has(places, count) && has(reflectance, cached) && has(direct, shining) &&
+             has(seen, shining) && has(sums.flat, summed) && has(coverage, summed) &&
+             has(probes, isWarm ? scene.waves.probes() : 0) && has(uneven, isWarm ? cached : 0);
   fit = fit && has(sums.maps, isWarm ? scene.encoding.mapCount() : 0);
   fit = fit && has(errors.mapSums, summed * scene.encoding.mapCount());
   for (const std::vector<Vec3>& map : sums.maps) fit = fit && has(map, summed);
@@ -229,14 +231,8 @@ std::span<LightSpread> GatherState::spreadsOf(const GatherScene& scene, std::siz
   return std::span(spreads).subspan(wave * sources, sources);
 }
 
-double GatherState::meanLuminance(double share) const {
-  double total = 0.0;
-  for (std::size_t t = 0; t < sums.flat.size(); ++t) total += static_cast<double>(luminance(meanLight(t)));
-  return share * total / static_cast<double>(std::max<std::size_t>(1, sums.flat.size()));
-}
-
 float GatherState::errorOf(const Waves& all, std::size_t wave, std::size_t i) const {
-  return errors.standardError(all, wave, i);
+  return errors.standardError(all, wave, i, places);
 }
 
 std::uint64_t gatherKey(const GatherScene& scene, const GatherOptions& options) {

@@ -80,6 +80,11 @@ struct GatherState {
   std::vector<PackedColor> reflectance;
   std::vector<PackedColor> radiance;  // that the texel reflects: levels.count each
   std::vector<std::uint8_t> uneven;   // WarmTexel::isUneven
+  // Mean luminance of the flat map in the place that lights the texel: what it sees, where it has light of its own, and
+  // what is seen from where its light comes from by bounces. What is bright or dark, and how much an error matters, is
+  // told by it alone: places that share no light are judged apart. Of a bake of no bounces: of the waves around. 0: the
+  // warm-up found no light.
+  std::vector<float> places;
   // With GatherScene::leavesLightOut alone: light from light samples that the maps leave out; with indirectOnly sums of
   // what the rays of all passes saw shine.
   std::vector<Vec3> direct;
@@ -106,8 +111,6 @@ struct GatherState {
   float weightOf(std::size_t texel) const { return static_cast<float>(std::max(1u, samplesOf[texel])); }
   /// Irradiance / pi of the flat map.
   Vec3 meanLight(std::size_t texel) const { return sums.flat[texel] / weightOf(texel); }
-  /// `share` of the mean luminance over all texels; 0 before there are samples.
-  double meanLuminance(double share = 1.0) const;
   /// Standard error of the flat map's luminance at texel `i` of a wave.
   float errorOf(const Waves& waves, std::size_t wave, std::size_t i) const;
 };

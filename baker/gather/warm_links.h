@@ -39,6 +39,7 @@ class WarmLinks::Reader {
       : found_(links.found_.data() + first), share_(links.shares_[wave].begin()), end_(links.shares_[wave].end()) {}
 
   bool isTexel() const { return found_[at_] != kNoTexel; }
+  std::uint32_t texel() const { return found_[at_]; }
   /// What the texel of the link passes on; once for each link. Asks memory for what a later link will.
   Vec3 lightOf(std::span<const Vec3> reflected) {
     const std::uint32_t later = found_[at_ + kAhead];

@@ -27,6 +27,9 @@ class WarmSweeps {
   /// Sweeps until the light has settled, or as many times as the cache has levels, and fills the cache.
   void run();
 
+  /// After run: irradiance / pi of all texels.
+  std::span<const Vec3> light() const { return light_; }
+
  private:
   void reflect(std::span<const Vec3> light);
   void sweep(bool isFirst);

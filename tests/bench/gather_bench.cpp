@@ -293,7 +293,7 @@ void compare(benchmark::State& state, int place, std::uint32_t samples, std::opt
   };
   const auto gatherWave = [&](std::size_t first) {
     GatheredWave done;
-    GatherWave(scene, 0, first, kLanes).gather(0, samples, f.cache, kOpen, {}, done);
+    GatherWave(scene, 0, first, kLanes).gather(0, samples, f.cache, kOpen, {}, {}, done);
     for (const GatheredTexel& texel : done.texels) gatherSum += texel.flat.x;
     rays += static_cast<double>(done.rays);
   };
@@ -343,7 +343,7 @@ void gather(benchmark::State& state) {
     for (const std::size_t first : firsts) {
       GatherWave wave(f.scene, 0, first, kLanes);
       GatheredWave done;
-      wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache, kOpen, {}, done);
+      wave.gather(0, static_cast<std::uint32_t>(state.range(1)), f.cache, kOpen, {}, {}, done);
       rays += static_cast<std::int64_t>(done.rays);
     }
   state.SetItemsProcessed(rays);

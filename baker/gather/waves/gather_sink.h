@@ -48,6 +48,7 @@ struct GatherSink {
   MapTotals totals{};
   bool tallied = false;  // whether the gather rays are
   LightTally rays{};
+  std::array<float, kLanes> perPlace{};  // what light is multiplied by to be tallied
 
   /// Radiance that a texel reflects, by level.
   const PackedColor* reflectedBy(std::uint32_t texel) const {
@@ -59,7 +60,7 @@ struct GatherSink {
   void report(std::size_t lane, std::uint32_t sample) { result.nonFinite.push_back({page, coords[lane], sample}); }
 
   void tally(std::size_t lane, const Vec3& dirTangent, const Vec3& light) {
-    if (tallied) rays.add(lane, luminance(light) * std::max(0.0f, dirTangent.z));
+    if (tallied) rays.add(lane, perPlace[lane] * luminance(light) * std::max(0.0f, dirTangent.z));
   }
   void addSeen(std::size_t lane, const Vec3& dirTangent, const Vec3& light) {
     result.texels[lane].seen += Vec3d(light * std::max(0.0f, dirTangent.z));

@@ -4,12 +4,32 @@
 #include <bit>
 
 namespace lumel {
+namespace {
+
+/// Within a place light differs by less, from texel to texel.
+constexpr float kOnePlace = 0.01f;
+
+}  // namespace
 
 GatherWave::GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t first, std::size_t count)
     : wave_(scene, page, first, count), near_(wave_), pilot_(scene.transport.rays) {}
 
+/// By what light is multiplied to be compared from lane to lane: where a wave lies in several places, each counts
+/// alike.
+static std::array<float, kLanes> sharesOf(std::span<const float> places) {
+  std::array<float, kLanes> shares;
+  shares.fill(1.0f);
+  if (places.empty()) return shares;
+  const auto [least, most] = std::ranges::minmax(places);
+  if (least >= kOnePlace * most) return shares;
+  for (std::size_t lane = 0; lane < places.size(); ++lane)
+    shares[lane] = places[lane] > 0.0f ? most / places[lane] : 0.0f;
+  return shares;
+}
+
 void GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
-                        std::span<const std::uint8_t> buried, std::span<LightSpread> spreads, GatheredWave& result) {
+                        std::span<const std::uint8_t> buried, std::span<const float> places,
+                        std::span<LightSpread> spreads, GatheredWave& result) {
   GatherSink sink{wave_.scene, cache, result, wave_.page,
                   std::span(wave_.scene.texels[wave_.page].coords).subspan(wave_.first, wave_.count)};
   for (std::size_t lane = 0; lane < wave_.count; ++lane)
@@ -19,6 +39,7 @@ void GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const 
   if (coveredCount_ == 0) return;
   for (std::size_t lane = 0; lane < wave_.count; ++lane)
     if ((wave_.first + lane) % kProbeStride == 0) sink.probedLane = lane;
+  sink.perPlace = sharesOf(places);
   const auto seenToArrive = [&] {
     const LightTransport& transport = wave_.scene.transport;
     // Where texels take light from other lamps than hits do, they teach nothing.
@@ -80,9 +101,10 @@ void GatherWave::gatherLight(const NetRange& net, std::span<LightSpread> spreads
 }
 
 /// What a strategy's samples brought to the flat map, and would have brought with nothing in the way.
-static void tallyLight(const SampledLight& sampled, const Vec3Lanes& dirTangent, LightTally& tally) {
+static void tallyLight(const SampledLight& sampled, const Vec3Lanes& dirTangent,
+                       const std::array<float, kLanes>& perPlace, LightTally& tally) {
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    const float flat = luminance(sampled.light[lane]) * kInvPi * dirTangent.z[lane];
+    const float flat = perPlace[lane] * luminance(sampled.light[lane]) * kInvPi * dirTangent.z[lane];
     if (sampled.shadows.valid[lane]) tally.unshadowed += flat * flat;
     if (sampled.found(lane)) tally.add(lane, flat);
   }
@@ -112,7 +134,7 @@ void GatherWave::sampleStrategy(std::size_t strategy, std::uint32_t first, std::
     sampled.trace(wave_.scene.transport.rays, TraceMode::Packet);
     Vec3Lanes dirTangent;
     turnToTangent(points.frame, sampled.wi, dirTangent);
-    if (pilot) tallyLight(sampled, dirTangent, lightTallies_[strategy]);
+    if (pilot) tallyLight(sampled, dirTangent, sink.perPlace, lightTallies_[strategy]);
     keepVisible(sampled.shadows, weight, sampled.light);
     sink.addToMaps(dirTangent, sampled.light, [s](std::size_t) { return s; });
     if (wave_.scene.levels.endless) continue;

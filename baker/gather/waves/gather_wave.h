@@ -40,11 +40,13 @@ class GatherWave {
   float coverage(std::size_t lane) const { return static_cast<float>(std::min(wave_.points.area(lane), 1.0)); }
 
   /// Samples [first, end) of every covered texel. `cache`: levels.count values per texel of the map, the radiance
-  /// that the texel reflects. `buried`: one per texel of the wave; nothing is gathered for those. `spreads`: what
-  /// the wave remembers of its light from pass to pass: of each of GatherScene::strategies, and last of the gather
+  /// that the texel reflects. `buried`: one per texel of the wave; nothing is gathered for those. `places`: the
+  /// same, their places' light (GatherState::places), which `spreads` weigh by; empty: all are of one place. `spreads`:
+  /// what the wave remembers of its light from pass to pass: of each of GatherScene::strategies, and last of the gather
   /// rays; empty without strategies. `result`: empty before.
   void gather(std::uint32_t first, std::uint32_t end, std::span<const PackedColor> cache,
-              std::span<const std::uint8_t> buried, std::span<LightSpread> spreads, GatheredWave& result);
+              std::span<const std::uint8_t> buried, std::span<const float> places, std::span<LightSpread> spreads,
+              GatheredWave& result);
 
  private:
   void gatherLight(const NetRange& net, std::span<LightSpread> spreads, GatherSink& sink);
