@@ -95,7 +95,7 @@ Expected<void> gatherPass(const GatherScene& scene, GatherState& state, std::siz
     if (!known.done) {
       const std::span buried = std::span(state.buried).subspan(wave.start, wave.count);
       if (first == 0 || std::ranges::count(buried, 0) > 0) {
-        GatherWave texels(scene, wave.page, wave.first, wave.count);
+        GatherWave texels(scene, wave.page, wave.first, wave.count, known.sampled);
         texels.gather(first, end, state.radiance, buried, state.spreadsOf(scene, w), done);
         for (std::size_t i = 0; i < wave.count; ++i) state.coverage[wave.start + i] = texels.coverage(i);
       }

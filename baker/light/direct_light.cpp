@@ -104,7 +104,7 @@ std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& st
       break;
     case LightStrategy::Emissive:
       transport.emissive.sample(receivers.p, receivers.active, samples.draw1D(patternBase + kEmitter),
-                                samples.draw2D(patternBase + kEmitterPoint), taken);
+                                samples.draw2D(patternBase + kEmitterPoint), taken, transport.sampled);
       break;
     case LightStrategy::Sun:
       transport.environment.sampleSun(samples.draw2D(patternBase + kSun), taken);

@@ -98,7 +98,7 @@ std::uint64_t directLight(const LightTransport& transport, const ReceiverLanes& 
       if (sampled.found(lane)) add(static_cast<int>(lane), sampled.wi[lane], sampled.light[lane]);
   };
   take(!transport.punctual.empty(), LightStrategy::EveryPunctual);
-  take(!transport.emissive.empty(), LightStrategy::Emissive);
+  take(transport.emissive.samples(transport.sampled), LightStrategy::Emissive);
   take(transport.environment.sunSampled(), LightStrategy::Sun);
   take(transport.environment.skySampled(), LightStrategy::Sky);
   return shadowRays;

@@ -329,7 +329,7 @@ bool WaveTracer::shadeHit(int lane, int depth) {
     result_.texels[l].sums.countGatherRay(hit.backFace && !transport_.materials.material(hit.material).doubleSided);
   const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
   if (emitted != Vec3(0.0f) && !leavesOut(depth))
-    path.radiance += path.beta * emitted * misWeight(path.pdf, transport_.emissive.pdf(hit, path.origin));
+    path.radiance += path.beta * emitted * misWeight(path.pdf, transport_.emitterPdf(hit, path.origin));
   if (depth == options_.bounces) return false;
   path.beta *= transport_.materials.albedo(hit.point);
   if (path.beta == Vec3(0.0f)) return false;
