@@ -59,7 +59,7 @@ class MaskWave {
 
   void addSample(std::uint32_t sample, const std::vector<LightTransport>& lamps, WaveMask& mask) {
     LaneFlags active{};
-    Vec3Lanes p, ng, ns, rayStart;
+    Vec3Lanes p, ng, ns, rayStart, lift;
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       if (!covered_[lane]) continue;
       const SurfacePoint point = footprints_[lane].sample(samplers_[lane].get2D(sample, kMaskFootprint));
@@ -72,9 +72,10 @@ class MaskWave {
       ng.set(lane, receiver.ng);
       ns.set(lane, receiver.ns);
       rayStart.set(lane, receiver.rayStart);
+      lift.set(lane, receiver.lift);
     }
     samples_.setSampleOfAll(sample);
-    const ReceiverLanes receivers{active, p, ng, ns, rayStart};
+    const ReceiverLanes receivers{active, p, ng, ns, rayStart, false, nullptr, &lift};
     SampledLight sampled;
     for (std::size_t k = 0; k < lamps.size(); ++k) {
       const auto pattern = static_cast<std::uint32_t>(k) * kPatternsPerLight;

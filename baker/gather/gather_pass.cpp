@@ -118,7 +118,7 @@ Expected<void> gatherPass(const GatherScene& scene, GatherState& state, std::siz
       std::span<const float> places;
       if (scene.levels.count > 0) places = std::span(state.places).subspan(wave.start, wave.count);
       if (first == 0 || std::ranges::count(buried, 0) > 0) {
-        GatherWave texels(scene, wave.page, wave.first, wave.count);
+        GatherWave texels(scene, wave.page, wave.first, wave.count, known.sampled);
         texels.gather(first, end, state.radiance, buried, places, state.spreadsOf(scene, w), done);
         for (std::size_t i = 0; i < wave.count; ++i) state.coverage[wave.start + i] = texels.coverage(i);
       }

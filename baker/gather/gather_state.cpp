@@ -17,7 +17,7 @@ constexpr double kGatherCredit = 0.5;
 
 constexpr std::string_view kMagic = "lumel gather state\n";
 /// Grows with every change of what is written.
-constexpr std::uint32_t kVersion = 4;
+constexpr std::uint32_t kVersion = 5;
 constexpr std::size_t kBlock = std::size_t{1} << 20;
 
 /// FNV-1a (Fowler, Noll, Vo) over words of eight bytes, the last filled up with zeros.

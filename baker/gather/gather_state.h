@@ -45,8 +45,9 @@ enum class Cover : std::uint8_t { Unknown, Inside, Open };
 
 struct GatherState {
   struct OfWave {
-    std::uint32_t samples = 0;  // it has taken [0, samples) of each of its texels
-    std::uint32_t done = 0;     // 1: as good as its goal
+    std::uint32_t samples = 0;         // it has taken [0, samples) of each of its texels
+    std::uint32_t done = 0;            // 1: as good as its goal
+    Emitters sampled = Emitters::All;  // what its light samples look for, from the warm-up on
     // For the flat map and the others: sum over texels of the square of how far their means moved in the last pass.
     std::array<float, 1 + kMostMaps> moved{};
   };

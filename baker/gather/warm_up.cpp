@@ -114,6 +114,7 @@ Expected<void> warmUp(const GatherScene& scene, GatherState& state, Progress& pr
     WarmWave texels(scene, wave.page, wave.first, wave.count);
     std::array<CacheLink, std::size_t{kLanes} * kWarmRays> found;
     const auto warm = texels.warmUp(std::span(found).first(linkCount), counts);
+    state.waves[w].sampled = texels.sampled();
     links.keep(w, std::size_t{wave.start} * kWarmRays, std::span(found).first(linkCount));
     for (std::size_t i = 0; i < wave.count; ++i) {
       const std::size_t t = wave.start + i;

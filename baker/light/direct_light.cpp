@@ -5,10 +5,13 @@
 namespace lumel {
 namespace {
 
+const Vec3Lanes kNoLifts{};
+
 /// Aims shadow rays at the samples that the receivers see, and weighs what these would bring.
 template <bool kOpen>
-[[gnu::always_inline]] inline int aimShadowsOf(const ReceiverLanes& receivers, const LightSampleLanes& samples,
-                                               const SurfaceDensity& density, SampledLight& sampled) {
+[[gnu::always_inline]] inline int aimShadowsOf(const ReceiverLanes& receivers, const Vec3Lanes& lifts,
+                                               const LightSampleLanes& samples, const SurfaceDensity& density,
+                                               SampledLight& sampled) {
   const float constant = density.constant, perCosine = density.perCosine;
   RTCRay16& ray = sampled.shadows.ray;
   int count = 0;
@@ -16,7 +19,10 @@ template <bool kOpen>
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const Vec3 wi = samples.wi[lane];
     const float cosTheta = glm::dot(wi, receivers.ns[lane]);
-    const bool sees = kOpen | ((cosTheta > 0.0f) & (glm::dot(wi, receivers.ng[lane]) > 0.0f));
+    const Vec3 lift = lifts[lane];
+    const bool isLifted = (lift.x != 0.0f) | (lift.y != 0.0f) | (lift.z != 0.0f);
+    const bool above = glm::dot(wi, receivers.ng[lane]) > 0.0f;
+    const bool sees = kOpen | ((cosTheta > 0.0f) & (above | isLifted));
     const Vec3 weight = samples.weight[lane];
     const bool brings = (weight.x != 0.0f) | (weight.y != 0.0f) | (weight.z != 0.0f);
     const bool taken = (receivers.active[lane] != 0) & sees & brings;
@@ -29,7 +35,7 @@ template <bool kOpen>
     sampled.light.x[lane] = pick(taken, weight.x * share, 0.0f);
     sampled.light.y[lane] = pick(taken, weight.y * share, 0.0f);
     sampled.light.z[lane] = pick(taken, weight.z * share, 0.0f);
-    const Vec3 start = receivers.rayStart[lane];
+    const Vec3 start = receivers.rayStart[lane] + pick(above, Vec3(0.0f), lift);
     const bool distant = samples.distant[lane] != 0;
     ray.org_x[lane] = start.x;
     ray.org_y[lane] = start.y;
@@ -44,13 +50,15 @@ template <bool kOpen>
   return count;
 }
 
-LUMEL_FOR_EACH_CPU int aimShadows(const ReceiverLanes& receivers, const LightSampleLanes& samples,
-                                  const SurfaceDensity& density, SampledLight& sampled) {
-  return aimShadowsOf<false>(receivers, samples, density, sampled);
+LUMEL_FOR_EACH_CPU int aimShadows(const ReceiverLanes& receivers, const Vec3Lanes& lifts,
+                                  const LightSampleLanes& samples, const SurfaceDensity& density,
+                                  SampledLight& sampled) {
+  return aimShadowsOf<false>(receivers, lifts, samples, density, sampled);
 }
-LUMEL_FOR_EACH_CPU int aimOpenShadows(const ReceiverLanes& receivers, const LightSampleLanes& samples,
-                                      const SurfaceDensity& density, SampledLight& sampled) {
-  return aimShadowsOf<true>(receivers, samples, density, sampled);
+LUMEL_FOR_EACH_CPU int aimOpenShadows(const ReceiverLanes& receivers, const Vec3Lanes& lifts,
+                                      const LightSampleLanes& samples, const SurfaceDensity& density,
+                                      SampledLight& sampled) {
+  return aimShadowsOf<true>(receivers, lifts, samples, density, sampled);
 }
 
 }  // namespace
@@ -104,7 +112,7 @@ std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& st
       break;
     case LightStrategy::Emissive:
       transport.emissive.sample(receivers.p, receivers.active, samples.draw1D(patternBase + kEmitter),
-                                samples.draw2D(patternBase + kEmitterPoint), taken);
+                                samples.draw2D(patternBase + kEmitterPoint), taken, transport.sampled);
       break;
     case LightStrategy::Sun:
       transport.environment.sampleSun(samples.draw2D(patternBase + kSun), taken);
@@ -114,8 +122,9 @@ std::uint64_t takeLight(const LightTransport& transport, const LightStrategy& st
           sky != nullptr ? *sky : transport.environment.findSky(samples.draw2D(patternBase + kSky)), taken);
       break;
   }
-  const int count = receivers.open ? aimOpenShadows(receivers, taken, density, sampled)
-                                   : aimShadows(receivers, taken, density, sampled);
+  const Vec3Lanes& lifts = receivers.lift != nullptr ? *receivers.lift : kNoLifts;
+  const int count = receivers.open ? aimOpenShadows(receivers, lifts, taken, density, sampled)
+                                   : aimShadows(receivers, lifts, taken, density, sampled);
   sampled.shadows.any = count > 0;
   return static_cast<std::uint64_t>(count);
 }

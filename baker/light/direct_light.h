@@ -98,7 +98,7 @@ std::uint64_t directLight(const LightTransport& transport, const ReceiverLanes& 
       if (sampled.found(lane)) add(static_cast<int>(lane), sampled.wi[lane], sampled.light[lane]);
   };
   take(!transport.punctual.empty(), LightStrategy::EveryPunctual);
-  take(!transport.emissive.empty(), LightStrategy::Emissive);
+  take(transport.emissive.samples(transport.sampled), LightStrategy::Emissive);
   take(transport.environment.sunSampled(), LightStrategy::Sun);
   take(transport.environment.skySampled(), LightStrategy::Sky);
   return shadowRays;
@@ -108,15 +108,16 @@ template <class Add>
 std::uint64_t directLight(const LightTransport& transport, const LightLanes& lanes, const SampleLanes& samples,
                           std::uint32_t patternBase, TraceMode mode, const SurfaceDensity& density, Add add,
                           PunctualChoice* punctual = nullptr) {
-  Vec3Lanes p, ng, ns, rayStart;
+  Vec3Lanes p, ng, ns, rayStart, lift;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     p.set(lane, lanes.receivers[lane].p);
     ng.set(lane, lanes.receivers[lane].ng);
     ns.set(lane, lanes.receivers[lane].ns);
     rayStart.set(lane, lanes.receivers[lane].rayStart);
+    lift.set(lane, lanes.receivers[lane].lift);
   }
-  return directLight(transport, ReceiverLanes{lanes.active, p, ng, ns, rayStart, false, lanes.perReach2}, samples,
-                     patternBase, mode, density, add, punctual);
+  return directLight(transport, ReceiverLanes{lanes.active, p, ng, ns, rayStart, false, lanes.perReach2, &lift},
+                     samples, patternBase, mode, density, add, punctual);
 }
 
 }  // namespace lumel

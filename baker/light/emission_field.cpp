@@ -347,6 +347,15 @@ bool EmissionField::shrinkToLit(TexelBox& box) const {
   return true;
 }
 
+double EmissionField::squareIn(const TexelBox& box) const {
+  const std::size_t top = levels_.size() - 1;
+  const std::vector<Tile> tiles = tilesOf(box);
+  if (tiles.empty()) return box.area() * levels_[top].sums[0].square / boxOf(0, 0, x_.patches()).area();
+  double square = 0.0;
+  for (const Tile& tile : tiles) square += momentsIn(top, 0, 0, toTile(tile, common(box, tileBox(tile)))).square;
+  return square;
+}
+
 bool EmissionField::shinesIn(const TexelBox& near) const {
   const TexelBox box{near.min - kBeside, near.max + kBeside};
   const std::vector<Tile> tiles = tilesOf(box);

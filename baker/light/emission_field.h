@@ -46,6 +46,8 @@ class EmissionField {
   /// Integrates the luminance over a polygon, in luminance times texels. It is positive exactly where something shines
   /// on a part with area. A polygon that covers more than kMostTiles repetitions gets the texture's mean.
   double integral(const TexelPolygon& polygon) const;
+  /// Integrates the square of the luminance over a box.
+  double squareIn(const TexelBox& box) const;
   /// Tells whether anything shines within `box`, which may be a line or a point, or at most a thousandth of a texel
   /// beside it.
   bool shinesIn(const TexelBox& box) const;

@@ -101,6 +101,35 @@ EmissiveTriangles::EmissiveTriangles(RayScene& rays, const Materials& materials)
       describe(whole[i], fields[static_cast<std::size_t>(rays.parts()[whole[i].part].primitive->material)].get());
   });
   divide(whole, fields);
+  findWide();
+  all_ = choiceAmong(Emitters::All);
+  if (hasWide_) withoutWide_ = choiceAmong(Emitters::WithoutWide);
+  uniform_ = std::all_of(triangles_.begin(), triangles_.end(), [](const Emitter& e) { return e.uniform; });
+}
+
+/// Finds the range of luminances that holds most of the area that shines.
+void EmissiveTriangles::findWide() {
+  const auto brightness = [&](std::uint32_t i) { return triangles_[i].luminance * triangles_[i].shining.contrast; };
+  std::vector<std::uint32_t> order;
+  for (std::uint32_t i = 0; i < triangles_.size(); ++i)
+    if (brightness(i) > 0.0f && std::isfinite(brightness(i))) order.push_back(i);
+  std::ranges::sort(order, {}, brightness);
+  double area = 0.0, most = 0.0;
+  std::size_t dimmest = 0, first = 0, end = 0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    area += static_cast<double>(triangles_[order[i]].doubleArea);
+    for (; brightness(order[dimmest]) * kWideRange < brightness(order[i]); ++dimmest)
+      area -= static_cast<double>(triangles_[order[dimmest]].doubleArea);
+    if (!(area > most)) continue;
+    most = area;
+    first = dimmest;
+    end = i + 1;
+  }
+  hasWide_ = end - first >= kFewestWide;
+  for (std::size_t i = first; i < end && hasWide_; ++i) triangles_[order[i]].isWide = true;
+}
+
+EmissiveTriangles::Choice EmissiveTriangles::choiceAmong(Emitters among) const {
   std::vector<LightBounds> bounds(triangles_.size());
   for (std::size_t i = 0; i < triangles_.size(); ++i) {
     const Emitter& emitter = triangles_[i];
@@ -110,11 +139,12 @@ EmissiveTriangles::EmissiveTriangles(RayScene& rays, const Materials& materials)
     bounds[i].max = glm::max(emitter.corner, glm::max(second, third));
     bounds[i].axis = emitter.ng;
     bounds[i].cosSpread = emitter.back > 0.0f ? -1.0f : 1.0f;
-    bounds[i].power = 0.5f * emitter.doubleArea * emitter.luminance;
+    const bool isLeftOut = among == Emitters::WithoutWide && emitter.isWide;
+    bounds[i].power = isLeftOut ? 0.0f : 0.5f * emitter.doubleArea * emitter.luminance;
   }
-  tree_ = LightTree(bounds);
-  for (const std::uint32_t triangle : tree_.onlyLeaf()) few_.push_back(triangles_[triangle]);
-  uniform_ = std::all_of(triangles_.begin(), triangles_.end(), [](const Emitter& e) { return e.uniform; });
+  Choice choice{LightTree(bounds), {}};
+  for (const std::uint32_t triangle : choice.tree.onlyLeaf()) choice.few.push_back(triangles_[triangle]);
+  return choice;
 }
 
 EmissiveTriangles::Fields EmissiveTriangles::fieldsOf(const RayScene& rays) const {
@@ -185,9 +215,11 @@ std::vector<ShiningPart> EmissiveTriangles::partsOf(const Emitter& emitter, cons
   if (!(emitter.luminance > 0.0f)) return {};
   const std::optional<TexturedTriangle> triangle = onTexture(emitter, field);
   if (!triangle || triangle->isLine()) return {emitter.shining};
-  std::vector<ShiningPart> parts = triangle->parts(mostBoxes);
+  const bool cutOut = materials_->needsAlphaTest(*rays_->parts()[emitter.part].primitive);
+  const double mean = cutOut ? triangle->mean() : static_cast<double>(emitter.luminance);
+  std::vector<ShiningPart> parts = triangle->parts(mostBoxes, mean);
   // Cut-outs take the same share of every part.
-  const auto opacity = static_cast<float>(static_cast<double>(emitter.luminance) / triangle->mean());
+  const float opacity = cutOut ? static_cast<float>(static_cast<double>(emitter.luminance) / mean) : 1.0f;
   for (ShiningPart& part : parts) part.luminance *= opacity;
   return parts.empty() ? std::vector<ShiningPart>{emitter.shining} : parts;
 }
@@ -248,6 +280,18 @@ std::uint32_t EmissiveTriangles::emitterAt(std::size_t triangle, const Vec2& bar
     best = i;
   }
   return best;
+}
+
+/// Returns the emitter that a ray hit, or kNone.
+std::uint32_t EmissiveTriangles::emitterAt(const HitSurface& hit) const {
+  const std::int64_t first = rays_->parts()[hit.part].firstEmitter;
+  if (first < 0) return kNone;
+  return emitterAt(static_cast<std::size_t>(first) + hit.point.triangle, hit.point.barycentric);
+}
+
+bool EmissiveTriangles::isWide(const HitSurface& hit) const {
+  const std::uint32_t light = emitterAt(hit);
+  return light != kNone && triangles_[light].isWide;
 }
 
 float EmissiveTriangles::importance(std::uint32_t triangle, const Vec3& p) const {
@@ -399,22 +443,23 @@ LUMEL_FOR_EACH_CPU void EmissiveTriangles::samplePoints(const Vec3Lanes& p, cons
 }
 
 void EmissiveTriangles::sample(const Vec3Lanes& p, const LaneFlags& active, const UnitLanes& uTriangle,
-                               const UnitSquareLanes& uPoint, LightSampleLanes& samples) const {
+                               const UnitSquareLanes& uPoint, LightSampleLanes& samples, Emitters among) const {
   Chosen chosen;
-  if (!few_.empty()) {
-    chooseAmongFew(few_, p, uTriangle, chosen);
+  const auto& [tree, few] = choiceOf(among);
+  if (!few.empty()) {
+    chooseAmongFew(few, p, uTriangle, chosen);
   } else {
     LightTree::Descent descent;
-    tree_.descend(p, nullptr, active, uTriangle.u, descent);
+    tree.descend(p, nullptr, active, uTriangle.u, descent);
     std::array<LaneFlags, LightTree::kLeaf> lights;
-    tree_.lightsOf(descent, lights);
+    tree.lightsOf(descent, lights);
     chooseInLeaves(triangles_.data(), lights, descent, p, chosen);
     for (std::size_t lane = 0; lane < kLanes; ++lane)
       chosen.radiance.set(lane, triangles_[chosen.triangle[lane]].radiance);
   }
   samplePoints(p, uPoint, chosen, samples);
   if (uniform_) return;
-  const std::vector<Emitter>& from = few_.empty() ? triangles_ : few_;
+  const std::vector<Emitter>& from = few.empty() ? triangles_ : few;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const Emitter& emitter = from[chosen.triangle[lane]];
     if (!emitter.uniform && samples.pdf[lane] > 0.0f)
@@ -422,13 +467,11 @@ void EmissiveTriangles::sample(const Vec3Lanes& p, const LaneFlags& active, cons
   }
 }
 
-float EmissiveTriangles::pdf(const HitSurface& hit, const Vec3& origin) const {
-  const std::int64_t first = rays_->parts()[hit.part].firstEmitter;
-  if (first < 0) return 0.0f;
-  const std::uint32_t light = emitterAt(static_cast<std::size_t>(first) + hit.point.triangle, hit.point.barycentric);
+float EmissiveTriangles::pdf(const HitSurface& hit, const Vec3& origin, Emitters among) const {
+  const std::uint32_t light = emitterAt(hit);
   if (light == kNone) return 0.0f;
-  const float probability =
-      tree_.probability({origin}, light, [&](std::uint32_t triangle) { return importance(triangle, origin); });
+  const float probability = choiceOf(among).tree.probability(
+      {origin}, light, [&](std::uint32_t triangle) { return importance(triangle, origin); });
   if (!(probability > 0.0f)) return 0.0f;
   const Emitter& emitter = triangles_[light];
   const Vec3 a = emitter.corner - origin;

@@ -15,6 +15,7 @@ struct ReceiverLanes {
   bool open = false;  // points in space: light arrives from all sides, and both normals are zero
   /// Null, or by lane one over the square of the reach within which lights are taken as two (NearLight), 0 for none.
   const float* perReach2 = nullptr;
+  const Vec3Lanes* lift = nullptr;  // as of Receiver; null: of zeros
 };
 
 /// One light sample of every lane as seen from its receiver, before visibility.

@@ -131,7 +131,7 @@ NearSample sampleNear(const LightTransport& transport, const Atlas& atlas, const
   transport.punctual.sampleAt(near.light(), point.position, onLight, sample.wi, sample.target, facing);
   const Vec3 toLight = source.position - point.position;
   const bool above = source.shape < 0 || glm::dot(toLight, sample.receiver.ng) > 0.0f;
-  const bool sees = glm::dot(sample.wi, sample.receiver.ng) > 0.0f && glm::dot(sample.wi, sample.receiver.ns) > 0.0f;
+  const bool sees = sample.receiver.isOpenTowards(sample.wi) && glm::dot(sample.wi, sample.receiver.ns) > 0.0f;
   if (above && sees) sample.light = facing * glm::dot(toLight, toLight) * chosen.perIntensity;
   return sample;
 }

@@ -20,9 +20,7 @@ Receiver receiverAt(const RayScene& rays, const Atlas& atlas, const SurfacePoint
   if (!(rounded > 0.0f)) return receiver;
   const Vec3 lift =
       rounded * liftToRound(point.position - corners[0], e1, e2, {point.barycentric.y, point.barycentric.z}, normals);
-  if (!isLifted(lift, receiver.ng, offsetDistance(corners, translation))) return receiver;
-  receiver.rayStart += lift;
-  receiver.ng = receiver.ns;
+  if (isLifted(lift, receiver.ng, offsetDistance(corners, translation))) receiver.lift = lift;
   return receiver;
 }
 

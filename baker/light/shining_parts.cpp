@@ -49,20 +49,23 @@ Vec2 TexturedTriangle::weightsOf(const Vec2d& texel) const {
   return {static_cast<float>(w1), static_cast<float>(w2)};
 }
 
-std::vector<ShiningPart> TexturedTriangle::parts(std::size_t mostBoxes) const {
+std::vector<ShiningPart> TexturedTriangle::parts(std::size_t mostBoxes, double mean) const {
   std::vector<ShiningPart> parts;
   for (const TexelBox& box : field_->divide(polygon_, meters_, mostBoxes)) {
     const TexelPolygon polygon = clipped(polygon_, box);
     const double area = polygon.area();
     if (!(area > 0.0)) continue;
-    const double light = field_->integral(polygon);
+    const bool isWhole = area >= kWhole * area_;
+    const double light = isWhole ? mean * area_ : field_->integral(polygon);
     if (!(light > 0.0)) continue;
-    if (area >= kWhole * area_) return {{.luminance = static_cast<float>(light / area)}};
+    // What of the box lies beside the polygon counts, too: a bound is good enough.
+    const auto contrast = static_cast<float>(std::sqrt(field_->squareIn(box) * area) / light);
+    if (isWhole) return {{.luminance = static_cast<float>(mean), .contrast = contrast}};
     for (std::size_t i = 2; i < polygon.count; ++i) {
       const std::array<Vec2, 3> corners = {weightsOf(polygon.corners[0]), weightsOf(polygon.corners[i - 1]),
                                            weightsOf(polygon.corners[i])};
       const Vec2 d1 = corners[1] - corners[0], d2 = corners[2] - corners[0];
-      if (d1.x * d2.y != d1.y * d2.x) parts.push_back({corners, static_cast<float>(light / area)});
+      if (d1.x * d2.y != d1.y * d2.x) parts.push_back({corners, static_cast<float>(light / area), contrast});
     }
   }
   return parts;

@@ -14,6 +14,7 @@ namespace lumel {
 struct ShiningPart {
   std::array<Vec2, 3> corners{Vec2(0, 0), Vec2(1, 0), Vec2(0, 1)};  // weights of the triangle's vertices 1 and 2
   float luminance = 0.0f;                                           // mean over the part
+  float contrast = 1.0f;  // root of its mean square over its mean, or somewhat more
 };
 
 /// How a triangle lies in the plane of its emission texture.
@@ -31,8 +32,8 @@ class TexturedTriangle {
   double mean() const { return field_->integral(polygon_) / area_; }
   /// Returns parts that do not overlap, hold all that shines, and come from at most about `mostBoxes` boxes of the
   /// texture. Their area times luminance adds up to that of the triangle. One part may be the whole triangle.
-  /// Precondition: !isLine().
-  std::vector<ShiningPart> parts(std::size_t mostBoxes) const;
+  /// `mean` is what mean() returns. Precondition: !isLine().
+  std::vector<ShiningPart> parts(std::size_t mostBoxes, double mean) const;
 
  private:
   Vec2 weightsOf(const Vec2d& texel) const;

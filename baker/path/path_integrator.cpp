@@ -219,7 +219,7 @@ void WaveTracer::startSample() {
     path.gatherPdf = gatherHemispherePdf(path.gatherTangent.z);
     const Vec3 dirWorld = path.frame.fromLocal(path.gatherTangent);
     // A bent shading normal gathers from below the surface too, where nothing arrives.
-    if (glm::dot(dirWorld, receiver.ng) > 0.0f) launch(static_cast<int>(lane), receiver, dirWorld, path.gatherPdf);
+    if (receiver.isOpenTowards(dirWorld)) launch(static_cast<int>(lane), receiver, dirWorld, path.gatherPdf);
     path.beta = Vec3(1.0f);
   }
 }
@@ -228,7 +228,7 @@ void WaveTracer::launch(int lane, const Receiver& receiver, const Vec3& dirWorld
   Path& path = paths_[static_cast<std::size_t>(lane)];
   path.origin = receiver.p;
   path.pdf = pdf;
-  rays_.set(lane, receiver.rayStart, dirWorld);
+  rays_.set(lane, receiver.startTowards(dirWorld), dirWorld);
   ++result_.rays;
 }
 
@@ -259,7 +259,8 @@ void WaveTracer::lightFromNear() {
       if (near.light == Vec3(0.0f)) continue;
       ShadowPacket shadow;
       shadow.clear();
-      shadow.set(l, near.receiver.rayStart, near.target - near.receiver.rayStart, 1.0f);
+      const Vec3 start = near.receiver.startTowards(near.wi);
+      shadow.set(l, start, near.target - start, 1.0f);
       transport_.rays.occluded(shadow, TraceMode::Packet);
       ++result_.shadowRays;
       if (shadow.visible(l)) addLight(l, near.frame.toLocal(near.wi), near.light);
@@ -329,7 +330,7 @@ bool WaveTracer::shadeHit(int lane, int depth) {
     result_.texels[l].sums.countGatherRay(hit.backFace && !transport_.materials.material(hit.material).doubleSided);
   const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
   if (emitted != Vec3(0.0f) && !leavesOut(depth))
-    path.radiance += path.beta * emitted * misWeight(path.pdf, transport_.emissive.pdf(hit, path.origin));
+    path.radiance += path.beta * emitted * misWeight(path.pdf, transport_.emitterPdf(hit, path.origin));
   if (depth == options_.bounces) return false;
   path.beta *= transport_.materials.albedo(hit.point);
   if (path.beta == Vec3(0.0f)) return false;

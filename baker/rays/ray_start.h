@@ -37,11 +37,11 @@ inline Vec3 offsetPoint(const Vec3& p, const Vec3& ng, const std::array<Vec3, 3>
 }
 
 /// Returns how far unit normals at a triangle's corners describe a surface that is rounded outwards over it, 0 to 1:
-/// they spread along its edges. From 15 to 20 degrees of lean the share falls to nothing, without a step: normals that
-/// lean as those of an eight-sided basin (22) or of a box with smooth edges (45) are a look and not a shape, and rays
-/// that start so far out would miss what stands over the facets, such as a rim.
+/// they spread along its edges. A column of six sides (30 degrees) and a sphere of 8 x 5 are wholly round. From 35 to
+/// 44 degrees of lean the share falls to nothing, without a step: normals that lean as those of a box with smooth edges
+/// (45) are a look and not a shape.
 inline float roundedShare(const Vec3& ng, const Vec3& e1, const Vec3& e2, const std::array<Vec3, 3>& normals) {
-  constexpr float kWholeCosine = 0.966f, kNoCosine = 0.94f;
+  constexpr float kWholeCosine = 0.82f, kNoCosine = 0.72f;
   float least = 1.0f;
   for (const Vec3& normal : normals) least = std::min(least, glm::dot(ng, normal));
   if (!(least > kNoCosine)) return 0.0f;
@@ -56,8 +56,10 @@ inline float roundedShare(const Vec3& ng, const Vec3& e1, const Vec3& e2, const 
 
 /// Returns the way from a point of a rounded triangle out to the surface that its unit normals describe, or zero where
 /// that bends inwards.
-/// Rays that start there do not meet the facets of the round thing itself, which would show as steps where its shade
-/// begins (Hanika 2021, "Hacking the Shadow Terminator"). The point lies at `fromFirst` = b.x e1 + b.y e2 from
+/// Rays that go below the plane of the facet, and above the round surface, start there, so that they do not meet the
+/// round thing itself, which would show as black facets where its shade begins (after Hanika 2021, "Hacking the Shadow
+/// Terminator"). All others start on the facet: further out they would miss what stands over it, such as the rim of a
+/// basin. The point lies at `fromFirst` = b.x e1 + b.y e2 from
 /// the first corner.
 inline Vec3 liftToRound(const Vec3& fromFirst, const Vec3& e1, const Vec3& e2, const Vec2& b,
                         const std::array<Vec3, 3>& normals) {
@@ -69,8 +71,8 @@ inline Vec3 liftToRound(const Vec3& fromFirst, const Vec3& e1, const Vec3& e2, c
          b.y * below(fromFirst - e2, normals[2]);
 }
 
-/// Tells whether rays start at the lifted place (`lift` by liftToRound): where it lies further out than the plain
-/// offset. What is below is then what lies below the shading normal.
+/// Tells whether rays that go below the facet start at the lifted place (`lift` by liftToRound): where it lies further
+/// out than the plain offset. Elsewhere there are no such rays.
 inline bool isLifted(const Vec3& lift, const Vec3& ng, float offsetMeters) { return glm::dot(lift, ng) > offsetMeters; }
 
 }  // namespace lumel

@@ -372,7 +372,7 @@ TEST(RayScene, OffsetStartsClearTheirSurface) {
 /// Gather rays from a spot of (x, z) on the ground, `width` across.
 AimedRays aimed(const Vec3& from, float width, std::uint32_t seed) {
   const LaneFlags active{};
-  Vec3Lanes p, ng;
+  Vec3Lanes p, ng, none;
   FrameLanes frame;
   float x[kLanes], y[kLanes];
   for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
@@ -384,7 +384,7 @@ AimedRays aimed(const Vec3& from, float width, std::uint32_t seed) {
     frame.set(lane, {{1, 0, 0}, {0, 0, -1}, {0, 1, 0}});
   }
   AimedRays rays;
-  aimGatherRays(x, y, {active, p, p, frame, ng}, rays);
+  aimGatherRays(x, y, {active, p, p, frame, ng, none}, rays);
   return rays;
 }
 

@@ -25,17 +25,20 @@ inline float awayFromZero(float component) {
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const Vec3 world = from.frame[lane].fromLocal(rays.dirTangent[lane]);
     const bool above = glm::dot(world, from.ng[lane]) > 0.0f;
+    const Vec3 lift = from.lift[lane];
+    const bool isLifted = (lift.x != 0.0f) | (lift.y != 0.0f) | (lift.z != 0.0f);
+    const Vec3 start = from.rayStart[lane] + pick(above, Vec3(0.0f), lift);
     rays.pdf[lane] = gatherHemispherePdf(rays.dirTangent.z[lane]);
-    ray.org_x[lane] = from.rayStart.x[lane];
-    ray.org_y[lane] = from.rayStart.y[lane];
-    ray.org_z[lane] = from.rayStart.z[lane];
+    ray.org_x[lane] = start.x;
+    ray.org_y[lane] = start.y;
+    ray.org_z[lane] = start.z;
     ray.dir_x[lane] = awayFromZero(world.x);
     ray.dir_y[lane] = awayFromZero(world.y);
     ray.dir_z[lane] = awayFromZero(world.z);
     ray.tfar[lane] = std::numeric_limits<float>::infinity();
     hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
     hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
-    rays.packet.valid[lane] = above ? -1 : 0;
+    rays.packet.valid[lane] = above | isLifted ? -1 : 0;
   }
 }
 

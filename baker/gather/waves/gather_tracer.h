@@ -132,7 +132,7 @@ class GatherTracer {
     const HitSurface hit = transport_.rays.surfaceAt(packet, lane);
     const Vec3 emitted = emittedTowardsRay(transport_.materials, hit);
     if (emitted != Vec3(0.0f))
-      sink_.light(flight, emitted * misWeight(flight.pdf, transport_.emissive.pdf(hit, flight.origin)), flight.depth);
+      sink_.light(flight, emitted * misWeight(flight.pdf, transport_.emitterPdf(hit, flight.origin)), flight.depth);
   }
 
   /// Of a hit to be shaded. Textures are not read where the texel knows their mean. Without them the material tells

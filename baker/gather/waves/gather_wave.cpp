@@ -11,8 +11,12 @@ constexpr float kOnePlace = 0.01f;
 
 }  // namespace
 
-GatherWave::GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t first, std::size_t count)
-    : wave_(scene, page, first, count), near_(wave_), pilot_(scene.transport.rays) {}
+GatherWave::GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t first, std::size_t count,
+                       Emitters sampled)
+    : wave_(scene, page, first, count),
+      transport_(scene.transport.with(sampled)),
+      near_(wave_),
+      pilot_(scene.transport.rays) {}
 
 /// By what light is multiplied to be compared from lane to lane: where a wave lies in several places, each counts
 /// alike.
@@ -41,13 +45,12 @@ void GatherWave::gather(std::uint32_t first, std::uint32_t end, std::span<const 
     if ((wave_.first + lane) % kProbeStride == 0) sink.probedLane = lane;
   sink.perPlace = sharesOf(places);
   const auto seenToArrive = [&] {
-    const LightTransport& transport = wave_.scene.transport;
     // Where texels take light from other lamps than hits do, they teach nothing.
-    const bool teaches = transport.straight == nullptr;
-    return punctualChoice(transport.punctual, wave_.scene.strategies, teaches ? spreads : std::span<LightSpread>());
+    const bool teaches = transport_.straight == nullptr;
+    return punctualChoice(transport_.punctual, wave_.scene.strategies, teaches ? spreads : std::span<LightSpread>());
   };
-  GatherTracer tracer(wave_.scene.transport, wave_.scene.map, wave_.scene.reflectance, wave_.scene.lastDepth,
-                      seenToArrive(), sink);
+  GatherTracer tracer(transport_, wave_.scene.map, wave_.scene.reflectance, wave_.scene.lastDepth, seenToArrive(),
+                      sink);
   for (std::uint32_t sample = first; sample < end;) {
     const NetRange net = netAt(sample, end);
     if (!spreads.empty()) gatherLight(net, spreads, sink);
@@ -114,10 +117,12 @@ static void tallyLight(const SampledLight& sampled, const Vec3Lanes& dirTangent,
 void GatherWave::sampleStrategy(std::size_t strategy, std::uint32_t first, std::uint32_t end, float weight, bool pilot,
                                 GatherSink& sink) {
   SampledLight sampled;
-  const LightTransport transport = wave_.scene.transport.atTexels();
+  const LightTransport transport = transport_.atTexels();
+  const LightStrategy::Kind kind = wave_.scene.strategies[strategy].kind;
+  if (kind == LightStrategy::Emissive && !transport.emissive.samples(transport.sampled)) return;
   // While one sample's shadow rays are traced, memory brings the cells of the sky for the next.
   std::array<EnvironmentLight::Places, 2> sky;
-  const bool isSky = wave_.scene.strategies[strategy].kind == LightStrategy::Sky;
+  const bool isSky = kind == LightStrategy::Sky;
   const auto findSky = [&](std::uint32_t s) {
     wave_.lightSamples.setSampleOfAll(s);
     sky[s % 2] = wave_.scene.transport.environment.findSky(wave_.lightSamples.draw2D(kSky));

@@ -34,7 +34,9 @@ class CoherencePilot {
 class GatherWave {
  public:
   /// Texels [first, first + count) of a page, count <= kLanes.
-  GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t first, std::size_t count);
+  /// Light samples look for the emitters `sampled`, which must not depend on samples of the gather.
+  GatherWave(const GatherScene& scene, std::uint32_t page, std::size_t first, std::size_t count,
+             Emitters sampled = Emitters::All);
 
   /// Share of the texel's area that is covered, 0..1.
   float coverage(std::size_t lane) const { return static_cast<float>(std::min(wave_.points.area(lane), 1.0)); }
@@ -66,6 +68,7 @@ class GatherWave {
   void collectSky(const AimedRays& rays, std::uint32_t lanes, Vec3Lanes& light, GatherSink& sink) const;
 
   WaveTexels wave_;
+  LightTransport transport_;  // of what its rays hit
   NearTexels near_;
   std::size_t coveredCount_ = 0;
   std::vector<LightTally> lightTallies_;  // of the strategies

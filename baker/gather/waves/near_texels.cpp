@@ -47,7 +47,8 @@ void NearTexels::addSample(const WaveTexels& wave, const Texel& texel, std::size
   const int lane = static_cast<int>(texel.lane);
   ShadowPacket shadow;
   shadow.clear();
-  shadow.set(lane, near.receiver.rayStart, near.target - near.receiver.rayStart, 1.0f);
+  const Vec3 start = near.receiver.startTowards(near.wi);
+  shadow.set(lane, start, near.target - start, 1.0f);
   wave.scene.transport.rays.occluded(shadow, TraceMode::Packet);
   ++sink.result.shadowRays;
   if (!shadow.visible(lane)) return;

@@ -7,6 +7,9 @@
 namespace lumel {
 namespace {
 
+/// WarmWave::raysFindWide.
+constexpr double kMostSpread = 8.0;
+
 /// Collects the start of the cache.
 struct WarmSink {
   std::array<WarmTexel, kLanes>& texels;
@@ -104,12 +107,12 @@ Vec3 WarmWave::meanReflectance(const WarmAlbedos& albedos) const {
 }
 
 void WarmWave::warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts) {
-  PunctualChoice punctual = punctualChoice(wave_.scene.transport.punctual, {}, {});
+  PunctualChoice punctual = punctualChoice(transport_.punctual, {}, {});
   for (std::uint32_t s = 0; s < kWarmLights; ++s) {
     const ReceiverLanes receivers = wave_.points[s].receivers();
     wave_.lightSamples.setSampleOfAll(s);
     counts.shadowRays += directLight(
-        wave_.scene.transport, receivers, wave_.lightSamples, 0, TraceMode::Packet, kGatherDensity,
+        transport_, receivers, wave_.lightSamples, 0, TraceMode::Packet, kGatherDensity,
         [&](int lane, const Vec3& wi, const Vec3& light) {
           const auto l = static_cast<std::size_t>(lane);
           const Vec3 flat = light * (glm::dot(wi, receivers.ns[l]) * kInvPi);
@@ -121,7 +124,7 @@ void WarmWave::warmDirect(std::array<WarmTexel, kLanes>& texels, GatheredWave& c
 
 /// Lamps that light by bounces alone: what texels reflect of them is known from here.
 void WarmWave::warmHidden(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts) {
-  const LightTransport hidden = wave_.scene.transport.with(*wave_.scene.transport.hidden);
+  const LightTransport hidden = transport_.with(*transport_.hidden);
   SampledLight sampled;
   for (std::uint32_t s = 0; s < kWarmLights && !hidden.punctual.empty(); ++s) {
     const ReceiverLanes receivers = wave_.points[s].receivers();
@@ -139,6 +142,44 @@ void WarmWave::warmHidden(std::array<WarmTexel, kLanes>& texels, GatheredWave& c
   }
 }
 
+void WarmWave::traceRays(std::array<WarmPacket, kWarmRays>& packets) {
+  SampleLanes samples = wave_.lightSamples;
+  for (std::uint32_t s = 0; s < kWarmRays; ++s) {
+    auto& [rays, lookup] = packets[s];
+    samples.setSampleOfAll(s);
+    const UnitSquareLanes u = samples.draw2D(kWarmDirection);
+    // By the cosine every ray counts alike, so that no texel passes on more than it receives.
+    aimCosineRays(u.x, u.y, wave_.points[s], rays);
+    transport_.rays.intersect(rays.packet, TraceMode::Packet);
+    for (std::size_t lane = wave_.count; lane < kLanes; ++lane) rays.packet.valid[lane] = 0;
+    wave_.scene.map.findAll(rays.packet, lookup);
+  }
+}
+
+/// Whether rays find the wide emitters so well that their light varies no more from ray to ray than that of other
+/// surfaces does: its mean square is at most kMostSpread times the square of the mean of what shines by itself there.
+bool WarmWave::raysFindWide(const std::array<WarmPacket, kWarmRays>& packets) const {
+  double sum = 0.0, squares = 0.0, rays = 0.0;
+  for (const WarmPacket& traced : packets)
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const RayPacket& packet = traced.rays.packet;
+      if (!packet.valid[lane]) continue;
+      ++rays;
+      if (!packet.hit(lane)) {
+        if (transport_.environment.shines())
+          sum += static_cast<double>(luminance(transport_.environment.radiance(packet.direction(lane))));
+        continue;
+      }
+      if (transport_.rays.parts()[traced.lookup.parts[static_cast<std::size_t>(lane)]].firstEmitter < 0) continue;
+      const HitSurface hit = transport_.rays.surfaceAt(packet, lane);
+      if (!transport_.emissive.isWide(hit)) continue;
+      const auto light = static_cast<double>(luminance(emittedTowardsRay(transport_.materials, hit)));
+      sum += light;
+      squares += light * light;
+    }
+  return squares > 0.0 && rays * squares <= kMostSpread * sum * sum;
+}
+
 std::array<WarmTexel, kLanes> WarmWave::warmUp(std::span<CacheLink> links, GatheredWave& counts) {
   std::array<WarmTexel, kLanes> texels;
   wave_.points.draw(wave_.samplers, kFootprint, 0, kWarmLights);
@@ -148,31 +189,24 @@ std::array<WarmTexel, kLanes> WarmWave::warmUp(std::span<CacheLink> links, Gathe
     if (lane < wave_.count && wave_.covered[lane]) findAlbedos(lane, albedos[lane % 2]);
     if (lane > 0 && wave_.covered[lane - 1]) texels[lane - 1].reflectance = meanReflectance(albedos[(lane - 1) % 2]);
   }
+  std::array<WarmPacket, kWarmRays> packets;
+  traceRays(packets);
+  if (transport_.emissive.hasWide() && raysFindWide(packets)) transport_.sampled = Emitters::WithoutWide;
   warmDirect(texels, counts);
-  if (wave_.scene.transport.hidden != nullptr) warmHidden(texels, counts);
+  if (transport_.hidden != nullptr) warmHidden(texels, counts);
 
   WarmSink sink{texels, links};
-  GatherTracer tracer(wave_.scene.transport, wave_.scene.map, wave_.scene.reflectance, wave_.scene.lastDepth,
-                      punctualChoice(wave_.scene.transport.punctual, {}, {}), sink);
-  SampleLanes samples = wave_.lightSamples;
-  AimedRays rays;
-  TexelMap::Lookup lookup;
+  GatherTracer tracer(transport_, wave_.scene.map, wave_.scene.reflectance, wave_.scene.lastDepth,
+                      punctualChoice(transport_.punctual, {}, {}), sink);
   for (std::uint32_t s = 0; s < kWarmRays; ++s) {
-    const PointLanes from = wave_.points[s];
-    samples.setSampleOfAll(s);
-    const UnitSquareLanes u = samples.draw2D(kWarmDirection);
-    // By the cosine every ray counts alike, so that no texel passes on more than it receives.
-    aimCosineRays(u.x, u.y, from, rays);
-    wave_.scene.transport.rays.intersect(rays.packet, TraceMode::Packet);
-    for (std::size_t lane = wave_.count; lane < kLanes; ++lane) rays.packet.valid[lane] = 0;
-    wave_.scene.map.findAll(rays.packet, lookup);
+    auto& [rays, lookup] = packets[s];
     forEachLane(lookup.near, [&](std::size_t lane) { texels[lane].nears |= 1u << s; });
     lookup.near = 0;  // links lead to texels
     Flight flight;
     tracer.arriveAll(rays.packet, lookup, [&](int lane) -> const Flight& {
       const auto l = static_cast<std::size_t>(lane);
       ++counts.rays;
-      flight = wave_.flightOf(l, s, from, rays);
+      flight = wave_.flightOf(l, s, wave_.points[s], rays);
       flight.key = wave_.samplers[l].seedOf(kWarmHits);
       flight.beta = rays.packet.tint(l);
       return flight;

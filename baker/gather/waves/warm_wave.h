@@ -40,12 +40,21 @@ class WarmWave {
 
   /// Texels [first, first + count) of a page, count <= kLanes.
   WarmWave(const GatherScene& scene, std::uint32_t page, std::size_t first, std::size_t count)
-      : wave_(scene, page, first, count) {}
+      : wave_(scene, page, first, count), transport_(scene.transport) {}
 
   /// `links`: kWarmRays per texel of the wave. Adds the rays that it traced to `counts`.
   std::array<WarmTexel, kLanes> warmUp(std::span<CacheLink> links, GatheredWave& counts);
+  /// Returns which emitters light samples of the wave are to look for, after warmUp().
+  Emitters sampled() const { return transport_.sampled; }
 
  private:
+  /// The rays of all texels of one number, and what they hit.
+  struct WarmPacket {
+    AimedRays rays;
+    TexelMap::Lookup lookup;
+  };
+  void traceRays(std::array<WarmPacket, kWarmRays>& packets);
+  bool raysFindWide(const std::array<WarmPacket, kWarmRays>& packets) const;
   /// What a texel's reflectance is the mean of.
   struct WarmAlbedos {
     std::array<TrianglePoint, kWarmLights> points;
@@ -59,6 +68,7 @@ class WarmWave {
   void warmHidden(std::array<WarmTexel, kLanes>& texels, GatheredWave& counts);
 
   WaveTexels wave_;
+  LightTransport transport_;
 };
 
 }  // namespace lumel

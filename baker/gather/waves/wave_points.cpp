@@ -50,6 +50,7 @@ void WavePoints::setFrame(std::size_t lane, const Frame& frame, const Vec3& ng) 
   fill(drawn_[lane].b, frame.b);
   fill(drawn_[lane].n, frame.n);
   fill(drawn_[lane].ng, ng);
+  fill(drawn_[lane].lift, Vec3(0.0f));
 }
 
 WavePoints::Source WavePoints::sourceOf(const RayScene& rays, const Surface& surface,
@@ -236,11 +237,12 @@ LUMEL_FOR_EACH_CPU void WavePoints::locateFrames(const Source& from, std::uint32
       drawn.b[k][i] = pick(here, b[k], drawn.b[k][i]);
       drawn.n[k][i] = pick(here, n[k], drawn.n[k][i]);
       drawn.ng[k][i] = pick(here, ng[k], drawn.ng[k][i]);
+      drawn.lift[k][i] = pick(here, 0.0f, drawn.lift[k][i]);
     }
   }
 }
 
-/// Rays from a rounded source start over its facet (liftToRound).
+/// Rays from a rounded source that go below its facet start over it (liftToRound).
 LUMEL_FOR_EACH_CPU void WavePoints::lift(const Source& from, std::uint32_t number, const Places& places, Drawn& drawn) {
   const std::array<Vec3, 3> normals = from.normals;
   const Vec3 ng = from.ng, e1 = from.e1, e2 = from.e2;
@@ -250,8 +252,7 @@ LUMEL_FOR_EACH_CPU void WavePoints::lift(const Source& from, std::uint32_t numbe
     const Vec3 move = rounded * liftToRound(w1 * e1 + w2 * e2, e1, e2, {w1, w2}, normals);
     const bool lifted = (places.source[i] == number) & isLifted(move, ng, distance);
     for (int k = 0; k < 3; ++k) {
-      drawn.rayStart[k][i] += pick(lifted, move[k], 0.0f);
-      drawn.ng[k][i] = pick(lifted, drawn.n[k][i], drawn.ng[k][i]);
+      drawn.lift[k][i] = pick(lifted, move[k], drawn.lift[k][i]);
     }
   }
 }
@@ -307,6 +308,7 @@ LUMEL_FOR_EACH_CPU void WavePoints::turnToLanes(const Drawn* drawn, bool turning
   turn(&Drawn::b, [&](std::size_t i) -> Vec3Lanes& { return surfaces[i].frame.b; });
   turn(&Drawn::n, [&](std::size_t i) -> Vec3Lanes& { return surfaces[i].frame.n; });
   turn(&Drawn::ng, [&](std::size_t i) -> Vec3Lanes& { return surfaces[i].ng; });
+  turn(&Drawn::lift, [&](std::size_t i) -> Vec3Lanes& { return surfaces[i].lift; });
 }
 
 PlaceOnTriangle WavePoints::place(std::size_t lane, std::uint32_t i) const {

@@ -22,10 +22,11 @@ struct PointLanes {
   const Vec3Lanes& p;
   const Vec3Lanes& rayStart;
   const FrameLanes& frame;
-  const Vec3Lanes& ng;  // geometric normal; that of the frame where rayStart is lifted (liftToRound)
+  const Vec3Lanes& ng;    // geometric normal
+  const Vec3Lanes& lift;  // as of Receiver
 
   /// The same points as receivers of sampled light.
-  ReceiverLanes receivers() const { return {active, p, ng, frame.n, rayStart}; }
+  ReceiverLanes receivers() const { return {active, p, ng, frame.n, rayStart, false, nullptr, &lift}; }
 };
 
 /// Where on its triangle a point lies.
@@ -60,7 +61,7 @@ class WavePoints {
   PointLanes operator[](std::uint32_t i) const {
     const std::uint32_t at = i & mask_;
     const SurfaceLanes& surface = surfaces_[turning_ ? at : 0];
-    return {active_, p_[at], rayStarts_[at], surface.frame, surface.ng};
+    return {active_, p_[at], rayStarts_[at], surface.frame, surface.ng, surface.lift};
   }
   PlaceOnTriangle place(std::size_t lane, std::uint32_t i) const;
 
@@ -99,6 +100,7 @@ class WavePoints {
     float b[3][kMost];
     float n[3][kMost];
     float ng[3][kMost];
+    float lift[3][kMost];
   };
   /// The points of a divided texel.
   struct KeptPoints {
@@ -108,6 +110,7 @@ class WavePoints {
   struct SurfaceLanes {
     FrameLanes frame;
     Vec3Lanes ng;
+    Vec3Lanes lift;
   };
   static Source sourceOf(const RayScene& rays, const Surface& surface, const TexelFootprint::Source& from);
   void addTexel(const RayScene& rays, const Atlas& atlas, const TexelFootprint& footprint, std::size_t lane);
