@@ -15,15 +15,16 @@ constexpr double kBase = 145e6;
 
 // Bytes per covered texel and per texel of the pages, and what is resident then.
 // Sampling: places 16, the flat map's sums 12, reflectance 8, cache 8, counts 22, errors 13, light of places 4,
-// figures of waves 11; the map from pages to texels. The warm-up before it takes less: its links are 32.
-constexpr double kSamplingPerCovered = 94.0;
+// figures of waves 14; the map from pages to texels. The warm-up before it takes less: its links are 32.
+constexpr double kSamplingPerCovered = 97.0;
 constexpr double kSamplingPerPageTexel = 0.5;
 // Finishing: places; the flat and the aux image 28, what the denoiser knows of texels and its strips 13, charts and
 // masks.
 constexpr double kFinishingPerCovered = 16.0;
 constexpr double kFinishingPerPageTexel = 48.0;
-// A map of the encoding: its sums, and then its image.
+// A map of the encoding: its sums, and then its image; how far its mean moves, for its error.
 constexpr double kPerMap = 12.0;
+constexpr double kMovesPerMap = 4.0;
 
 // Bytes per triangle. Charts: the scene 24 and more, half-edges 31, the tree of merges 8; of one chart its mesh 34,
 // places and their moves 16, factor and what belongs to it 78. Sampling: the scene and its surfaces
@@ -65,7 +66,7 @@ BakeSize sceneSize(const Scene& scene) {
 double bakeMemory(const BakeSize& size) {
   const double charts = kChartsPerTriangle * size.triangles;
   const double sampling = kSamplingPerTriangle * size.triangles + kPerDecodedTexel * size.decodedTexels +
-                          (kSamplingPerCovered + kPerMap * size.maps) * size.coveredTexels +
+                          (kSamplingPerCovered + (kPerMap + kMovesPerMap) * size.maps) * size.coveredTexels +
                           kSamplingPerPageTexel * size.pageTexels + kPerSkyCell * size.skyCells;
   // scene.glb holds the encoded images once more, while it is written.
   const double finishing = size.encodedBytes + kFinishingPerTriangle * size.triangles +

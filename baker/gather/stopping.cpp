@@ -50,10 +50,12 @@ bool markDone(const GatherScene& scene, const GatherOptions& options, GatherStat
     for (std::size_t i = 0; i < wave.count; ++i) {
       const std::size_t t = wave.start + i;
       const bool inside = hasTarget && 2 * state.backFaces[t] > state.samplesOf[t];
-      const bool night = !(state.places[t] > 0.0f);
-      const double goal =
-          goalOf(options, static_cast<double>(luminance(state.meanLight(t))), static_cast<double>(state.places[t]));
-      met[w] += inside || night || worst * static_cast<double>(state.errorOf(scene.waves, w, i)) <= goal ? 1 : 0;
+      const auto light = static_cast<double>(luminance(state.meanLight(t)));
+      // Where the warm-up found no light a texel is a place of its own.
+      const double place = state.places[t] > 0.0f ? static_cast<double>(state.places[t]) : light;
+      const double goal = goalOf(options, light, place);
+      const bool isNight = !(place > 0.0);
+      met[w] += inside || isNight || worst * static_cast<double>(state.errorOf(scene.waves, w, i)) <= goal ? 1 : 0;
     }
     if (state.waves[w].done) met[w] = wave.count;
   }

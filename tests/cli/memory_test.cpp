@@ -47,7 +47,7 @@ TEST(Memory, OfTexelsIsToldAndBounded) {
   const Bake small = bakeOf(dir / "box.gltf", "512");
   ASSERT_GT(large.texels, small.texels + 5e5);
   EXPECT_LT((large.measured - small.measured) / (large.texels - small.texels),
-            175.0);  // what a bake may take, 12 of it moves of each map
+            190.0);  // what a bake may take, 12 of it moves of each map
 }
 
 TEST(Memory, OfTrianglesIsTold) {
