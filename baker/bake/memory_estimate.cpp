@@ -22,9 +22,9 @@ constexpr double kSamplingPerPageTexel = 0.5;
 // masks.
 constexpr double kFinishingPerCovered = 16.0;
 constexpr double kFinishingPerPageTexel = 48.0;
-// A map of the encoding: its sums, and then its image; how far its mean moves, for its error.
+// A map of the encoding: its sums, and then its image; how far its mean moves, and then its error.
 constexpr double kPerMap = 12.0;
-constexpr double kMovesPerMap = 4.0;
+constexpr double kErrorPerMap = 4.0;
 
 // Bytes per triangle. Charts: the scene 24 and more, half-edges 31, the tree of merges 8; of one chart its mesh 34,
 // places and their moves 16, factor and what belongs to it 78. Sampling: the scene and its surfaces
@@ -66,12 +66,12 @@ BakeSize sceneSize(const Scene& scene) {
 double bakeMemory(const BakeSize& size) {
   const double charts = kChartsPerTriangle * size.triangles;
   const double sampling = kSamplingPerTriangle * size.triangles + kPerDecodedTexel * size.decodedTexels +
-                          (kSamplingPerCovered + (kPerMap + kMovesPerMap) * size.maps) * size.coveredTexels +
+                          (kSamplingPerCovered + (kPerMap + kErrorPerMap) * size.maps) * size.coveredTexels +
                           kSamplingPerPageTexel * size.pageTexels + kPerSkyCell * size.skyCells;
   // scene.glb holds the encoded images once more, while it is written.
   const double finishing = size.encodedBytes + kFinishingPerTriangle * size.triangles +
                            kFinishingPerCovered * size.coveredTexels +
-                           (kFinishingPerPageTexel + kPerMap * size.maps) * size.pageTexels;
+                           (kFinishingPerPageTexel + (kPerMap + kErrorPerMap) * size.maps) * size.pageTexels;
   return kBase + size.encodedBytes + kPerSkyPixel * size.skyPixels + std::max({charts, sampling, finishing});
 }
 
