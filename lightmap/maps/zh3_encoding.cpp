@@ -20,16 +20,10 @@ inline void thirdBand(float x, float y, float z, float k, float& xy, float& yz, 
   zz = k * (z * z - 1.0f / 3.0f);
 }
 
-LUMEL_FOR_EACH_CPU void threeBands(const float* x, const float* y, const float* z, KernelLanes& lanes) {
-  for (std::size_t lane = 0; lane < kKernelLanes; ++lane) {
-    const float above = z[lane] > 0.0f ? 1.0f : 0.0f;
-    lanes.of[0][lane] = above * 0.25f;
-    lanes.of[1][lane] = above * (0.5f * x[lane]);
-    lanes.of[2][lane] = above * (0.5f * y[lane]);
-    lanes.of[3][lane] = above * (0.5f * z[lane]);
-    thirdBand(x[lane], y[lane], z[lane], above * kThirdBand, lanes.of[4][lane], lanes.of[5][lane], lanes.of[6][lane],
-              lanes.of[7][lane], lanes.of[8][lane]);
-  }
+LUMEL_FOR_EACH_CPU void thirdBandLanes(const float* x, const float* y, const float* z, KernelLanes& lanes) {
+  for (std::size_t lane = 0; lane < kKernelLanes; ++lane)
+    thirdBand(x[lane], y[lane], z[lane], z[lane] > 0.0f ? kThirdBand : 0.0f, lanes.of[4][lane], lanes.of[5][lane],
+              lanes.of[6][lane], lanes.of[7][lane], lanes.of[8][lane]);
 }
 
 /// The third band's form, of maps in the order of its kernels.
@@ -59,7 +53,8 @@ class ThreeBandEncoding : public Encoding {
     return k;
   }
   void laneKernels(const float* x, const float* y, const float* z, KernelLanes& lanes) const override {
-    threeBands(x, y, z, lanes);
+    twoBands_->laneKernels(x, y, z, lanes);
+    thirdBandLanes(x, y, z, lanes);
   }
   void finish(std::span<Vec3> maps, const Vec3& flat) const override { twoBands_->finish(maps.first(4), flat); }
   Vec3 decode(std::span<const Vec3> maps, const Vec3& n) const override {

@@ -81,6 +81,12 @@ TEST(BakeFiles, LightVolumesAreReadAsTheyWereWritten) {
   const auto damaged = readBake(dir, {.volumes = true});
   ASSERT_FALSE(damaged);
   EXPECT_TRUE(mentions(damaged.error().message, "volume-0.json"));
+  // Claims that memory could not hold are measured by the images, which are small.
+  std::ofstream(dir / "volume-0.json") << R"({"format": 1, "name": "", "origin": [0, 0, 0], "cell": [1, 1, 1],
+      "counts": [400, 400, 400]})";
+  const auto claimed = readBake(dir, {.volumes = true});
+  ASSERT_FALSE(claimed);
+  EXPECT_TRUE(mentions(claimed.error().message, "volume-0-points.exr"));
   ASSERT_TRUE(Fixture(1).write(dir));
   EXPECT_EQ(namesIn(dir).count("volume-0.json") + namesIn(dir).count("volume-0-sh0.exr"), 0u);
 }

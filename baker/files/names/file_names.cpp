@@ -8,7 +8,6 @@
 namespace lumel {
 namespace {
 
-constexpr const char* kFlat = "flat";
 constexpr const char* kAux = "aux";
 constexpr const char* kMasks = "masks";
 constexpr std::pair<std::string_view, std::string_view> kImageExtensions[] = {
@@ -16,35 +15,31 @@ constexpr std::pair<std::string_view, std::string_view> kImageExtensions[] = {
     {"image/bmp", ".bmp"},   {"image/tiff", ".tif"},       {"image/vnd.radiance", ".hdr"},
     {"image/x-exr", ".exr"}, {"image/vnd-ms.dds", ".dds"}, {"image/gif", ".gif"}};
 
+/// What follows the prefix and a number, as "-aux.exr" does in "lightmap-12-aux.exr"; empty where a name has no such
+/// start.
+std::string afterNumber(const std::string& name, std::string_view prefix) {
+  if (name.rfind(prefix, 0) != 0) return {};
+  const std::size_t end = name.find_first_not_of("0123456789", prefix.size());
+  return end == std::string::npos || end == prefix.size() ? std::string() : name.substr(end);
+}
+
+bool isImageOf(const std::string& rest, const std::vector<std::string>& kinds) {
+  return std::ranges::any_of(kinds, [&rest](const std::string& kind) { return rest == "-" + kind + ".exr"; });
+}
+
 bool isPageImage(const std::string& name) {
-  constexpr std::string_view prefix = "lightmap-";
-  if (name.rfind(prefix, 0) != 0) return false;
-  const std::size_t dash = name.find_first_not_of("0123456789", prefix.size());
-  if (dash == std::string::npos || dash == prefix.size()) return false;
-  const std::string rest = name.substr(dash);
-  const auto isRest = [&rest](const std::string& kind) { return rest == "-" + kind + ".exr"; };
-  return isRest(kFlat) || isRest(kAux) || isRest(kMasks) ||
-         std::any_of(knownMapNames().begin(), knownMapNames().end(), isRest);
+  const std::string rest = afterNumber(name, "lightmap-");
+  return isImageOf(rest, {kFlatMap, kAux, kMasks}) || isImageOf(rest, knownMapNames());
 }
 
 bool isSsbumpMap(const std::string& name) {
-  constexpr std::string_view prefix = "ssbump-";
-  if (name.rfind(prefix, 0) != 0) return false;
-  const std::size_t dot = name.find_first_not_of("0123456789", prefix.size());
-  if (dot == std::string::npos || dot == prefix.size()) return false;
-  const std::string rest = name.substr(dot);
-  return std::any_of(std::begin(kImageExtensions), std::end(kImageExtensions),
-                     [&rest](const auto& known) { return rest == known.second; });
+  const std::string rest = afterNumber(name, "ssbump-");
+  return std::ranges::any_of(kImageExtensions, [&rest](const auto& known) { return rest == known.second; });
 }
 
 bool isVolumeFile(const std::string& name) {
-  constexpr std::string_view prefix = "volume-";
-  if (name.rfind(prefix, 0) != 0) return false;
-  const std::size_t end = name.find_first_not_of("0123456789", prefix.size());
-  if (end == std::string::npos || end == prefix.size()) return false;
-  const std::string rest = name.substr(end);
-  const auto isRest = [&rest](const std::string& kind) { return rest == "-" + kind + ".exr"; };
-  return rest == ".json" || std::any_of(volumeKinds().begin(), volumeKinds().end(), isRest);
+  const std::string rest = afterNumber(name, "volume-");
+  return rest == ".json" || isImageOf(rest, volumeKinds());
 }
 
 }  // namespace
@@ -75,7 +70,7 @@ const std::vector<std::string>& volumeKinds() {
 
 std::vector<std::string> lightKinds(const std::vector<std::string>& mapNames) {
   std::vector<std::string> kinds = mapNames;
-  if (std::find(kinds.begin(), kinds.end(), kFlat) == kinds.end()) kinds.push_back(kFlat);
+  if (std::find(kinds.begin(), kinds.end(), kFlatMap) == kinds.end()) kinds.push_back(kFlatMap);
   return kinds;
 }
 

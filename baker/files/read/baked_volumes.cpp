@@ -57,9 +57,27 @@ Expected<Image> readKind(const fs::path& dir, std::size_t number, const std::str
   return std::move(image);
 }
 
+Expected<void> readPlaces(const fs::path& dir, std::size_t number, LightVolume& volume) {
+  const auto points = readKind(dir, number, "points", volume, 1, 4);
+  if (!points) return points.error();
+  const auto sight = readKind(dir, number, "sight", volume, kSightSide, 1);
+  if (!sight) return sight.error();
+  // Not before images of that size are there: a description may claim more than memory holds.
+  volume.points.resize(points->pixels.size() / 4);
+  for (std::size_t i = 0; i < volume.points.size(); ++i) {
+    VolumePoint& point = volume.points[i];
+    const float* values = points->pixels.data() + 4 * i;
+    point.offset = {values[0], values[1], values[2]};
+    point.isValid = values[3] > 0.5f;
+    const int column = static_cast<int>(i) % volume.counts[0], row = static_cast<int>(i) / volume.counts[0];
+    for (std::size_t s = 0; s < kSights; ++s)
+      point.nearness[s] = *sight->at(column * kSightSide + static_cast<int>(s) % kSightSide,
+                                     row * kSightSide + static_cast<int>(s) / kSightSide);
+  }
+  return {};
+}
+
 Expected<void> readLight(const fs::path& dir, std::size_t number, LightVolume& volume) {
-  volume.points.resize(static_cast<std::size_t>(volume.counts[0]) * static_cast<std::size_t>(volume.counts[1]) *
-                       static_cast<std::size_t>(volume.counts[2]));
   const auto readColors = [&](const std::string& kind, const auto& target) -> Expected<void> {
     const auto image = readKind(dir, number, kind, volume, 1, 3);
     if (!image) return image.error();
@@ -79,24 +97,6 @@ Expected<void> readLight(const fs::path& dir, std::size_t number, LightVolume& v
   return {};
 }
 
-Expected<void> readPlaces(const fs::path& dir, std::size_t number, LightVolume& volume) {
-  const auto points = readKind(dir, number, "points", volume, 1, 4);
-  if (!points) return points.error();
-  const auto sight = readKind(dir, number, "sight", volume, kSightSide, 1);
-  if (!sight) return sight.error();
-  for (std::size_t i = 0; i < volume.points.size(); ++i) {
-    VolumePoint& point = volume.points[i];
-    const float* values = points->pixels.data() + 4 * i;
-    point.offset = {values[0], values[1], values[2]};
-    point.isValid = values[3] > 0.5f;
-    const int column = static_cast<int>(i) % volume.counts[0], row = static_cast<int>(i) / volume.counts[0];
-    for (std::size_t s = 0; s < kSights; ++s)
-      point.nearness[s] = *sight->at(column * kSightSide + static_cast<int>(s) % kSightSide,
-                                     row * kSightSide + static_cast<int>(s) / kSightSide);
-  }
-  return {};
-}
-
 }  // namespace
 
 Expected<std::vector<LightVolume>> readVolumes(const fs::path& dir) {
@@ -104,8 +104,8 @@ Expected<std::vector<LightVolume>> readVolumes(const fs::path& dir) {
   for (std::size_t number = 0; fs::exists(dir / volumeFileName(number)); ++number) {
     auto volume = readGrid(dir / volumeFileName(number));
     if (!volume) return volume.error();
-    if (auto done = readLight(dir, number, *volume); !done) return done.error();
     if (auto done = readPlaces(dir, number, *volume); !done) return done.error();
+    if (auto done = readLight(dir, number, *volume); !done) return done.error();
     volumes.push_back(*std::move(volume));
   }
   return volumes;
