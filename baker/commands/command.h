@@ -37,6 +37,7 @@ Command renderCommand();
 Command infoCommand();
 Command diffCommand();
 Command convertCommand();
+Command exportCommand();
 Command studyCommand();
 
 }  // namespace lumel

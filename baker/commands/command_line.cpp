@@ -110,8 +110,8 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
 
   std::vector<std::unique_ptr<Parsed>> commands;
   std::set<std::string> names;
-  for (auto make :
-       {bakeCommand, ssbumpCommand, renderCommand, infoCommand, diffCommand, convertCommand, studyCommand}) {
+  for (auto make : {bakeCommand, ssbumpCommand, renderCommand, infoCommand, diffCommand, convertCommand, exportCommand,
+                    studyCommand}) {
     commands.push_back(std::make_unique<Parsed>());
     commands.back()->command = make();
     names.insert(commands.back()->command.name);

@@ -1,0 +1,105 @@
+// lumel export: a bake's maps as textures for GPUs, or everything that an engine needs.
+#include <cstdio>
+#include <memory>
+
+#include "baker/commands/command.h"
+#include "baker/export/export_folder.h"
+#include "baker/export/map_export.h"
+#include "baker/files/names/bake_format.h"
+#include "baker/files/names/conventions.h"
+#include "baker/files/read/baked_scene.h"
+#include "scene/base/parallel.h"
+
+namespace lumel {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+struct ExportArguments {
+  fs::path bake, output;
+  MapContainer format = MapContainer::Ktx2;
+  TexelFormat texels = TexelFormat::Bc6h;
+  std::string encoding;
+  std::optional<float> rgbmRange;
+  bool flatOnly = false, mips = true;
+  int threads = 0;
+};
+
+void declareOptions(OptionTable& o, ExportArguments& a) {
+  o.positionalPath("bake", a.bake, "Folder that lumel bake -o wrote").placeholder = "DIR";
+  Option& output = o.path("output", a.output, "Folder for the export");
+  output.shortName = "o";
+  output.required = true;
+  output.placeholder = "OUT";
+  o.group("Maps");
+  o.choice("format", a.format, {"exr-half", "png-rgbm", "ktx2", "dds"}, "Files of the maps");
+  o.choice("texels", a.texels, {"half", "rgb9e5", "bc6h"},
+           "Texels of ktx2 and dds: 64, 32 or 8 bits each. Maps that may be negative take signed bc6h or half");
+  o.text("encoding", a.encoding, "Which encoding's maps; without it the bake's first").placeholder = "NAME";
+  o.flag("flat-only", a.flatOnly, "The flat map alone, without the encoding's maps");
+  o.flag("mips", a.mips, "Mip levels in ktx2 and dds that keep charts apart (--no-mips: none)").defaultText = "on";
+  o.optionalNumber("rgbm-range", a.rgbmRange, {1e-6f, 1e9f},
+                   "Largest value that png-rgbm holds; without it that of the maps")
+      .placeholder = "X";
+  o.group("General");
+  o.integer("threads", a.threads, {0, 4096}, "Threads; 0: one per core");
+}
+
+/// Says what was written, and how far it is from the bake.
+void printResult(const ExportArguments& a, const Json& maps) {
+  double worst = 0.0;
+  std::size_t bytes = 0;
+  for (const Json& map : maps) {
+    std::error_code ec;
+    bytes += fs::file_size(a.output / map.at("file").get<std::string>(), ec);
+    if (map.at("relativeRmse").is_number()) worst = std::max(worst, map.at("relativeRmse").get<double>());
+  }
+  std::fprintf(stderr, "%s: %zu map%s, %.1f MiB, at most %.2g%% (RMS) from the bake\n", a.output.c_str(), maps.size(),
+               maps.size() == 1 ? "" : "s", static_cast<double>(bytes) / 1048576.0, 100.0 * worst);
+}
+
+Expected<void> runExport(const ExportArguments& a, CommandContext& context) {
+  const ThreadLimit limit(a.threads);
+  FileSet::recover(a.bake);
+  const auto bakeJson = readBakeJson(a.bake);
+  if (!bakeJson) return bakeJson.error();
+  const MapExportOptions options{a.format, a.texels, a.rgbmRange, a.mips, a.flatOnly};
+  const auto encoding = encodingOf(*bakeJson, (a.bake / "bake.json").string(), a.encoding);
+  if (!encoding) return encoding.error();
+  if (auto done = checkFits(**encoding, options); !done) return done;
+  auto folder = ExportFolder::open(a.output);
+  if (!folder) return folder.error();
+  const auto baked = readBake(a.bake, {.encoding = a.encoding, .flat = true, .aux = true});
+  if (!baked) return baked.error();
+  const auto maps = exportMaps(*baked, *bakeJson, options, *folder, context.progress);
+  if (!maps) return maps.error();
+  Json description = {{"encoding", describeEncoding(*baked->encoding)}};
+  description["conventions"] = describeConventions(*baked->encoding);
+  description["maps"] = *maps;
+  if (auto done = folder->commit(std::move(description)); !done) return done;
+  if (!context.quiet) printResult(a, *maps);
+  return {};
+}
+
+}  // namespace
+
+Command exportCommand() {
+  Command command;
+  const auto arguments = std::make_shared<ExportArguments>();
+  command.name = "export";
+  command.summary = "Write a bake's maps as textures for GPUs";
+  command.takesConfig = true;
+  command.examples =
+      "Examples:\n"
+      "  lumel export out/level -o out/textures --format ktx2\n"
+      "      BC6H with mip levels, 8 bits a texel; bake with --block-align 4 so that charts share no block\n"
+      "  lumel export out/level -o out/textures --format dds --texels rgb9e5\n"
+      "  lumel export out/level -o out/textures --format png-rgbm --flat-only --rgbm-range 64\n"
+      "export.json in the folder says what each file holds, and how far it is from the bake.";
+  declareOptions(command.options, *arguments);
+  command.run = [arguments](CommandContext& context) { return runExport(*arguments, context); };
+  return command;
+}
+
+}  // namespace lumel
