@@ -1,8 +1,10 @@
 // lumel export: a bake's maps as textures for GPUs, or everything that an engine needs.
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
 #include "baker/commands/command.h"
+#include "baker/export/engine_export.h"
 #include "baker/export/export_folder.h"
 #include "baker/export/map_export.h"
 #include "baker/files/names/bake_format.h"
@@ -23,6 +25,8 @@ struct ExportArguments {
   std::string encoding;
   std::optional<float> rgbmRange;
   bool flatOnly = false, mips = true;
+  Engine engine = Engine::Three;
+  bool keepLights = false;
   int threads = 0;
 };
 
@@ -42,43 +46,72 @@ void declareOptions(OptionTable& o, ExportArguments& a) {
   o.optionalNumber("rgbm-range", a.rgbmRange, {1e-6f, 1e9f},
                    "Largest value that png-rgbm holds; without it that of the maps")
       .placeholder = "X";
+  o.group("Engines");
+  o.choice("for", a.engine, {"three", "godot", "bevy", "unity"},
+           "Everything that an engine needs, with a README of the steps: scene, maps in its formats and units, tables, "
+           "loader; --format is its own then")
+      .defaultText = "";
+  o.flag("keep-lights", a.keepLights, "Leave lamps whose light is in the maps in the engine's scene");
   o.group("General");
   o.integer("threads", a.threads, {0, 4096}, "Threads; 0: one per core");
 }
 
 /// Says what was written, and how far it is from the bake.
-void printResult(const ExportArguments& a, const Json& maps) {
+void printResult(const ExportArguments& a, std::size_t files, const Json& description) {
   double worst = 0.0;
   std::size_t bytes = 0;
-  for (const Json& map : maps) {
+  for (const Json& map : description.at("maps")) {
     std::error_code ec;
     bytes += fs::file_size(a.output / map.at("file").get<std::string>(), ec);
-    if (map.at("relativeRmse").is_number()) worst = std::max(worst, map.at("relativeRmse").get<double>());
+    const Json error = map.value("relativeRmse", Json());
+    if (error.is_number()) worst = std::max(worst, error.get<double>());
   }
-  std::fprintf(stderr, "%s: %zu map%s, %.1f MiB, at most %.2g%% (RMS) from the bake\n", a.output.c_str(), maps.size(),
-               maps.size() == 1 ? "" : "s", static_cast<double>(bytes) / 1048576.0, 100.0 * worst);
+  std::fprintf(stderr, "%s: %zu files, maps of %.1f MiB", a.output.c_str(), files,
+               static_cast<double>(bytes) / 1048576.0);
+  if (worst > 0.0) std::fprintf(stderr, ", at most %.2g%% (RMS) from the bake", 100.0 * worst);
+  std::fputs("\n", stderr);
 }
 
-Expected<void> runExport(const ExportArguments& a, CommandContext& context) {
-  const ThreadLimit limit(a.threads);
-  FileSet::recover(a.bake);
-  const auto bakeJson = readBakeJson(a.bake);
-  if (!bakeJson) return bakeJson.error();
-  const MapExportOptions options{a.format, a.texels, a.rgbmRange, a.mips, a.flatOnly};
-  const auto encoding = encodingOf(*bakeJson, (a.bake / "bake.json").string(), a.encoding);
-  if (!encoding) return encoding.error();
-  if (auto done = checkFits(**encoding, options); !done) return done;
-  auto folder = ExportFolder::open(a.output);
-  if (!folder) return folder.error();
+Expected<Json> describeMaps(const ExportArguments& a, const Json& bakeJson, ExportFolder& folder, Progress& progress) {
   const auto baked = readBake(a.bake, {.encoding = a.encoding, .flat = true, .aux = true});
   if (!baked) return baked.error();
-  const auto maps = exportMaps(*baked, *bakeJson, options, *folder, context.progress);
+  const MapExportOptions options{a.format, a.texels, a.rgbmRange, a.mips, a.flatOnly};
+  const auto maps = exportMaps(*baked, bakeJson, options, folder, progress);
   if (!maps) return maps.error();
   Json description = {{"encoding", describeEncoding(*baked->encoding)}};
   description["conventions"] = describeConventions(*baked->encoding);
   description["maps"] = *maps;
-  if (auto done = folder->commit(std::move(description)); !done) return done;
-  if (!context.quiet) printResult(a, *maps);
+  return description;
+}
+
+/// Options that say nothing to what was asked for.
+Expected<void> checkOptions(const OptionTable& options) {
+  const bool isEngine = options.isGiven("for");
+  for (const char* name : {"format", "rgbm-range", "flat-only", "mips"})
+    if (isEngine && options.isGiven(name))
+      return usageError(std::string("--") + name + ": the engine's own is written with --for; leave it out");
+  if (!isEngine && options.isGiven("keep-lights"))
+    return usageError("--keep-lights: is for scenes, so give --for, too");
+  return {};
+}
+
+Expected<void> runExport(const ExportArguments& a, CommandContext& context) {
+  if (auto done = checkOptions(context.options); !done) return done;
+  const ThreadLimit limit(a.threads);
+  FileSet::recover(a.bake);
+  const auto bakeJson = readBakeJson(a.bake);
+  if (!bakeJson) return bakeJson.error();
+  const auto encoding = encodingOf(*bakeJson, (a.bake / "bake.json").string(), a.encoding);
+  if (!encoding) return encoding.error();
+  auto folder = ExportFolder::open(a.output);
+  if (!folder) return folder.error();
+  EngineExportOptions engine{a.engine, {}, a.encoding, a.keepLights};
+  if (context.options.isGiven("texels")) engine.texels = a.texels;
+  auto description = context.options.isGiven("for") ? exportFor(a.bake, engine, *folder, context.progress)
+                                                    : describeMaps(a, *bakeJson, *folder, context.progress);
+  if (!description) return description.error();
+  if (auto done = folder->commit(*description); !done) return done;
+  if (!context.quiet) printResult(a, folder->fileCount() - 1, *description);
   return {};
 }
 
@@ -88,7 +121,7 @@ Command exportCommand() {
   Command command;
   const auto arguments = std::make_shared<ExportArguments>();
   command.name = "export";
-  command.summary = "Write a bake's maps as textures for GPUs";
+  command.summary = "Write a bake for GPUs and engines";
   command.takesConfig = true;
   command.examples =
       "Examples:\n"
@@ -96,6 +129,8 @@ Command exportCommand() {
       "      BC6H with mip levels, 8 bits a texel; bake with --block-align 4 so that charts share no block\n"
       "  lumel export out/level -o out/textures --format dds --texels rgb9e5\n"
       "  lumel export out/level -o out/textures --format png-rgbm --flat-only --rgbm-range 64\n"
+      "  lumel export out/level -o game/level --for godot\n"
+      "      bake with --encoding rnm,sh1 for directional lightmaps in Godot and Unity\n"
       "export.json in the folder says what each file holds, and how far it is from the bake.";
   declareOptions(command.options, *arguments);
   command.run = [arguments](CommandContext& context) { return runExport(*arguments, context); };

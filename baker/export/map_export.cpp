@@ -175,13 +175,13 @@ class MapWriter {
   float range_ = 1.0f;
 };
 
+}  // namespace
+
 int dilatedRings(const Json& bakeJson) {
   const Json settings = bakeJson.value("settings", Json::object());
   const Json rings = settings.is_object() ? settings.value("dilate", Json()) : Json();
   return rings.is_number_integer() ? std::clamp(rings.get<int>(), 0, 1024) : 0;
 }
-
-}  // namespace
 
 Expected<void> checkFits(const Encoding& encoding, const MapExportOptions& options) {
   if (!encoding.isSigned() || options.flatAlone) return {};

@@ -22,6 +22,9 @@ struct MapExportOptions {
   bool flatAlone = false;                  // leave out the encoding's own maps
 };
 
+/// By how many texels the bake's maps were dilated, as bake.json states it.
+int dilatedRings(const nlohmann::ordered_json& bakeJson);
+
 /// Whether the encoding's maps can be written so. Errors: Usage, naming what to do instead.
 Expected<void> checkFits(const Encoding& encoding, const MapExportOptions& options);
 
