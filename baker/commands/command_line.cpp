@@ -5,9 +5,11 @@
 #include <memory>
 #include <ostream>
 #include <set>
+#include <span>
 
 #include "baker/commands/config_file.h"
 #include "baker/commands/help.h"
+#include "baker/commands/manual.h"
 #include "baker/commands/terminal_progress.h"
 #include "baker/files/names/version.h"
 
@@ -92,6 +94,30 @@ Expected<void> fillOptions(Parsed& parsed, const std::set<std::string>& allComma
   return {};
 }
 
+/// `lumel help`: nothing, a command, or for the build --man [COMMAND] or --completion. `text` is that of lumel itself.
+Expected<void> runHelp(const std::vector<std::string>& arguments, std::span<const Command* const> commands,
+                       const std::string& text, std::ostream& out) {
+  const bool isManual = arguments.size() > 1 && arguments[1] == "--man";
+  const std::size_t at = isManual ? 2 : 1;
+  if (arguments.size() > at + 1) return usageError("help takes one command; see lumel --help");
+  if (arguments.size() == at) {
+    out << (isManual ? manPageOfAll(commands) : text);
+    return {};
+  }
+  if (arguments[at] == "--completion") {
+    out << bashCompletion(commands);
+    return {};
+  }
+  std::set<std::string> names;
+  for (const Command* command : commands) {
+    names.insert(command->name);
+    if (command->name != arguments[at]) continue;
+    out << (isManual ? manPage(*command) : helpText(*command));
+    return {};
+  }
+  return usageError("unknown command '" + arguments[at] + "'; use one of " + joined(names) + "; see lumel --help");
+}
+
 }  // namespace
 
 Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::ostream& out) {
@@ -105,7 +131,7 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
       "  lumel bake level.gltf -o out/level --sky-color 0.4 0.6 1\n"
       "  lumel render out/level -o out/level.png\n"
       "\n"
-      "lumel COMMAND --help explains a command. Exit codes: 0 done, 1 failed, 2 wrong command line or config,\n"
+      "lumel help COMMAND explains a command. Exit codes: 0 done, 1 failed, 2 wrong command line or config,\n"
       "3 wrong input, 130 interrupted.");
 
   std::vector<std::unique_ptr<Parsed>> commands;
@@ -123,7 +149,12 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
       if (parsed->app->parsed()) return parsed.get();
     return nullptr;
   };
-  if (!arguments.empty() && !arguments[0].starts_with('-') && !names.count(arguments[0]))
+  if (arguments.empty() || arguments[0] == "help") {
+    std::vector<const Command*> all;
+    for (const auto& parsed : commands) all.push_back(&parsed->command);
+    return runHelp(arguments.empty() ? std::vector<std::string>{"help"} : arguments, all, root.help(), out);
+  }
+  if (!arguments[0].starts_with('-') && !names.count(arguments[0]))
     return usageError("unknown command '" + arguments[0] + "'; use one of " + joined(names) + "; see lumel --help");
   try {
     root.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));

@@ -49,7 +49,7 @@ MapExportOptions mapOptions(const EngineExportOptions& options) {
   maps.texels = options.texels.value_or(options.engine == Engine::Bevy ? TexelFormat::Rgb9e5 : TexelFormat::Half);
   maps.flatAlone = options.engine != Engine::Three;
   // three's loader takes the first level of textures without blocks alone, Bevy's shader reads no other.
-  maps.mips = options.engine == Engine::Three && maps.texels == TexelFormat::Bc6h;
+  maps.mips = false;
   return maps;
 }
 
@@ -120,6 +120,11 @@ Expected<Json> writeUnityDirections(const EngineSource& source, ExportFolder& fo
 
 Expected<Json> exportFor(const fs::path& bake, const EngineExportOptions& options, ExportFolder& folder,
                          Progress& progress) {
+  const bool hasKtx2 = options.engine == Engine::Three || options.engine == Engine::Bevy;
+  if (options.texels && !hasKtx2)
+    return usageError(std::string("--texels: ") + nameOf(options.engine) + " takes its own; leave it out");
+  if (options.engine == Engine::Three && options.texels == TexelFormat::Bc6h)
+    return usageError("--texels bc6h: three's KTX2Loader does not read it; use half or rgb9e5");
   const auto bakeJson = readBakeJson(bake);
   if (!bakeJson) return bakeJson.error();
   const std::string file = (bake / "bake.json").string();

@@ -7,7 +7,7 @@
 // 'rnm' where the export has these maps: then normal maps are lit from where the light came. Texels hold irradiance / pi,
 // three wants irradiance, hence the intensity of pi. Textures are stored from the top down and UVs run down, so nothing
 // is flipped.
-import { LinearFilter, NoColorSpace } from 'three';
+import { LinearFilter, NoColorSpace, ShaderChunk } from 'three';
 
 const MAP_NAMES = { flat: ['flat'], rnm: ['rnm0', 'rnm1', 'rnm2'] };
 
@@ -35,13 +35,13 @@ const RNM_TEXEL = /* glsl */ `
       texture2D( lumelRnm1, vLightMapUv ).rgb, texture2D( lumelRnm2, vLightMapUv ).rgb ), 1.0 );
 `;
 
-function useRnm(material, maps, chunks) {
+function useRnm(material, maps) {
   material.onBeforeCompile = (shader) => {
     shader.uniforms.lumelRnm1 = { value: maps[1] };
     shader.uniforms.lumelRnm2 = { value: maps[2] };
-    const lights = chunks.lights_fragment_maps.replace(
+    const lights = ShaderChunk.lights_fragment_maps.replace(
       /vec4 lightMapTexel = texture2D\( lightMap, vLightMapUv \);/, RNM_TEXEL);
-    if (lights === chunks.lights_fragment_maps) throw new Error('lumel: this version of three samples lightmaps otherwise');
+    if (lights === ShaderChunk.lights_fragment_maps) throw new Error('lumel: this version of three samples lightmaps otherwise');
     shader.fragmentShader = shader.fragmentShader
       .replace('void main() {', RNM_PARS + 'void main() {')
       .replace('#include <lights_fragment_maps>', lights);
@@ -61,7 +61,7 @@ function placed(textures, { scale, offset }) {
   });
 }
 
-export async function loadLumel(folder, { gltfLoader, ktx2Loader, mode = 'flat', ShaderChunk } = {}) {
+export async function loadLumel(folder, { gltfLoader, ktx2Loader, mode = 'flat' }) {
   const base = folder.endsWith('/') ? folder : folder + '/';
   const about = await (await fetch(base + 'export.json')).json();
   const names = MAP_NAMES[mode];
@@ -87,7 +87,7 @@ export async function loadLumel(folder, { gltfLoader, ktx2Loader, mode = 'flat',
     const material = object.material.clone();
     material.lightMap = maps[0];
     material.lightMapIntensity = Math.PI;
-    if (mode === 'rnm') useRnm(material, maps, ShaderChunk);
+    if (mode === 'rnm') useRnm(material, maps);
     object.material = material;
     lit.push(object);
   });
