@@ -10,6 +10,7 @@
 #include "baker/path/texel_sums.h"
 #include "lightmap/maps/denoise.h"
 #include "lightmap/maps/dilate.h"
+#include "scene/base/half.h"
 #include "scene/base/parallel.h"
 
 namespace lumel {

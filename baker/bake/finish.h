@@ -36,9 +36,6 @@ SeamFigures finishPages(std::vector<BakedPage>& pages, const Atlas& atlas, const
 /// finishPages: from here on maps may hold directions. Of no effect on an encoding that stores what it samples.
 void encodePages(std::vector<BakedPage>& pages, const Encoding& encoding);
 
-/// The largest number that a half holds.
-inline constexpr float kMostHalf = 65504.0f;
-
 /// Cuts light beyond kMostHalf, with a note in the figures that says how many values that were and how large.
 void cutToHalf(BakeResult& result);
 

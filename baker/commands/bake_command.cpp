@@ -22,6 +22,7 @@
 #include "lightmap/atlas/atlas.h"
 #include "lightmap/atlas/split_triangles.h"
 #include "lightmap/texels/texels.h"
+#include "scene/base/half.h"
 #include "scene/base/parallel.h"
 #include "scene/base/process_memory.h"
 #include "scene/base/split_text.h"

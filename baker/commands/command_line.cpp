@@ -131,8 +131,8 @@ Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::os
       "  lumel bake level.gltf -o out/level --sky-color 0.4 0.6 1\n"
       "  lumel render out/level -o out/level.png\n"
       "\n"
-      "lumel help COMMAND explains a command. Exit codes: 0 done, 1 failed, 2 wrong command line or config,\n"
-      "3 wrong input, 130 interrupted.");
+      "lumel help COMMAND explains a command. Exit codes:\n" +
+      std::string(kExitCodes) + ".");
 
   std::vector<std::unique_ptr<Parsed>> commands;
   std::set<std::string> names;

@@ -10,8 +10,8 @@
 
 namespace lumel {
 
-/// Runs `lumel ARGUMENTS...`. Nothing, help, --help and --version print to `out` and succeed. Errors: those of the subcommand, and
-/// Usage for an unknown option, a missing or a wrong value.
+/// Runs `lumel ARGUMENTS...`. Nothing, help, --help and --version print to `out` and succeed. Errors: those of the
+/// subcommand, and Usage for an unknown option, a missing or a wrong value.
 Expected<void> runCommandLine(const std::vector<std::string>& arguments, std::ostream& out);
 
 }  // namespace lumel

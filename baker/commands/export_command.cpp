@@ -7,6 +7,7 @@
 #include "baker/export/engine_export.h"
 #include "baker/export/export_folder.h"
 #include "baker/export/map_export.h"
+#include "baker/export/page_geometry.h"
 #include "baker/files/names/bake_format.h"
 #include "baker/files/names/conventions.h"
 #include "baker/files/read/baked_scene.h"
@@ -76,7 +77,7 @@ Expected<Json> describeMaps(const ExportArguments& a, const Json& bakeJson, Expo
   const auto baked = readBake(a.bake, {.encoding = a.encoding, .flat = true, .aux = true});
   if (!baked) return baked.error();
   const MapExportOptions options{a.format, a.texels, a.rgbmRange, a.mips, a.flatOnly};
-  const auto maps = exportMaps(*baked, bakeJson, options, folder, progress);
+  const auto maps = exportMaps(*baked, chartTexels(*baked, bakeJson), options, folder, progress);
   if (!maps) return maps.error();
   Json description = {{"encoding", describeEncoding(*baked->encoding)}};
   description["conventions"] = describeConventions(*baked->encoding);
@@ -85,8 +86,18 @@ Expected<Json> describeMaps(const ExportArguments& a, const Json& bakeJson, Expo
 }
 
 /// Options that say nothing to what was asked for.
-Expected<void> checkOptions(const OptionTable& options) {
+Expected<void> checkOptions(const ExportArguments& a, const OptionTable& options) {
   const bool isEngine = options.isGiven("for");
+  if (isEngine && a.engine != Engine::Three && options.isGiven("encoding"))
+    return usageError("--encoding: is for textures and three; other engines take what they can read");
+  const bool isTexture = a.format == MapContainer::Ktx2 || a.format == MapContainer::Dds;
+  for (const char* name : {"texels", "mips"})
+    if (!isEngine && !isTexture && options.isGiven(name))
+      return usageError(std::string("--") + name + ": is for --format ktx2 and dds");
+  if (!isEngine && a.format != MapContainer::PngRgbm && options.isGiven("rgbm-range"))
+    return usageError("--rgbm-range: is for --format png-rgbm");
+  if (!isEngine && a.flatOnly && options.isGiven("encoding"))
+    return usageError("--encoding: says nothing to --flat-only, whose map is the same for all; leave it out");
   for (const char* name : {"format", "rgbm-range", "flat-only", "mips"})
     if (isEngine && options.isGiven(name))
       return usageError(std::string("--") + name + ": the engine's own is written with --for; leave it out");
@@ -96,7 +107,7 @@ Expected<void> checkOptions(const OptionTable& options) {
 }
 
 Expected<void> runExport(const ExportArguments& a, CommandContext& context) {
-  if (auto done = checkOptions(context.options); !done) return done;
+  if (auto done = checkOptions(a, context.options); !done) return done;
   const ThreadLimit limit(a.threads);
   FileSet::recover(a.bake);
   const auto bakeJson = readBakeJson(a.bake);
@@ -107,11 +118,11 @@ Expected<void> runExport(const ExportArguments& a, CommandContext& context) {
   if (!folder) return folder.error();
   EngineExportOptions engine{a.engine, {}, a.encoding, a.keepLights};
   if (context.options.isGiven("texels")) engine.texels = a.texels;
-  auto description = context.options.isGiven("for") ? exportFor(a.bake, engine, *folder, context.progress)
+  auto description = context.options.isGiven("for") ? exportFor(a.bake, *bakeJson, engine, *folder, context.progress)
                                                     : describeMaps(a, *bakeJson, *folder, context.progress);
   if (!description) return description.error();
   if (auto done = folder->commit(*description); !done) return done;
-  if (!context.quiet) printResult(a, folder->fileCount() - 1, *description);
+  if (!context.quiet) printResult(a, folder->fileCount(), *description);
   return {};
 }
 

@@ -39,12 +39,21 @@ std::string namesOf(const Option& option) {
   return option.placeholder.empty() ? names : names + " " + option.placeholder;
 }
 
+}  // namespace
+
 std::string explanationOf(const Option& option) {
   if (option.defaultText.empty() || option.values == 0) return option.help;
   return option.help + " [" + option.defaultText + "]";
 }
 
-}  // namespace
+std::vector<std::pair<std::string, std::string>> commonOptions(const Command& command) {
+  std::vector<std::pair<std::string, std::string>> options;
+  if (command.takesConfig)
+    options.emplace_back("--config FILE", "Options from a TOML file; the command line wins over it");
+  options.emplace_back("-q, --quiet", "Print nothing but errors");
+  options.emplace_back("-h, --help", "Print this text and stop");
+  return options;
+}
 
 std::string helpText(const Command& command) {
   std::string usage = "Usage: lumel " + command.name;
@@ -66,9 +75,7 @@ std::string helpText(const Command& command) {
       if (!option.positional && option.group == group) text += entry(namesOf(option), explanationOf(option));
   }
   if (groups.empty() || groups.back() != "General") text += "\nGeneral\n";
-  if (command.takesConfig) text += entry("--config FILE", "Options from a TOML file; the command line wins over it");
-  text += entry("-q, --quiet", "Print nothing but errors");
-  text += entry("-h, --help", "Print this text and stop");
+  for (const auto& [names, explanation] : commonOptions(command)) text += entry(names, explanation);
   return text + "\n" + command.examples + "\n";
 }
 

@@ -3,6 +3,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "baker/commands/help.h"
 #include "baker/files/names/version.h"
 
 namespace lumel {
@@ -47,8 +48,7 @@ std::string namesOf(const Option& option) {
 
 std::string entry(const Option& option) {
   const std::string names = option.positional ? "\\fI" + roff(option.placeholder) + "\\fR" : namesOf(option);
-  const bool hasDefault = !option.defaultText.empty() && option.values != 0;
-  return ".TP\n" + names + "\n" + roff(option.help) + (hasDefault ? " [" + roff(option.defaultText) + "]" : "") + "\n";
+  return ".TP\n" + names + "\n" + roff(explanationOf(option)) + "\n";
 }
 
 /// The words of an option that takes one of a list: its placeholder is them, "draft|preview|production".
@@ -60,18 +60,10 @@ std::string wordsOf(const Option& option) {
   return words;
 }
 
-std::string generalOptions(const Command& command) {
-  return std::string(command.takesConfig ? ".TP\n\\fB\\-\\-config\\fR \\fIFILE\\fR\nOptions from a TOML file; the "
-                                           "command line wins over it\n"
-                                         : "") +
-         ".TP\n\\fB\\-q\\fR, \\fB\\-\\-quiet\\fR\nPrint nothing but errors\n"
-         ".TP\n\\fB\\-h\\fR, \\fB\\-\\-help\\fR\nPrint a summary of options and stop\n";
+const std::string& exitStatus() {
+  static const std::string text = ".SH EXIT STATUS\n" + roff(kExitCodes) + ".\n";
+  return text;
 }
-
-constexpr const char* kExitCodes =
-    ".SH EXIT STATUS\n0 done; 1 the work failed; 2 the command line or config is wrong; 3 the input is wrong; 4 done, "
-    "but "
-    "beyond a threshold that was asked for; 130 interrupted.\n";
 
 }  // namespace
 
@@ -91,8 +83,10 @@ std::string manPage(const Command& command) {
     text += entry(option);
   }
   if (group != "General") text += ".SS General\n";
-  text += generalOptions(command);
-  return text + ".SH NOTES\n.nf\n" + roff(command.examples) + "\n.fi\n" + kExitCodes + ".SH SEE ALSO\n.BR lumel (1)\n";
+  for (const auto& [names, explanation] : commonOptions(command))
+    text += ".TP\n\\fB" + roff(names) + "\\fR\n" + roff(explanation) + "\n";
+  return text + ".SH NOTES\n.nf\n" + roff(command.examples) + "\n.fi\n" + exitStatus() +
+         ".SH SEE ALSO\n.BR lumel (1)\n";
 }
 
 std::string manPageOfAll(std::span<const Command* const> commands) {
@@ -101,7 +95,7 @@ std::string manPageOfAll(std::span<const Command* const> commands) {
   for (const Command* command : commands)
     text += ".TP\n\\fB" + roff(command->name) + "\\fR\n" + roff(command->summary) + ": see \\fBlumel\\-" +
             roff(command->name) + "\\fR(1)\n";
-  return text + kExitCodes;
+  return text + exitStatus();
 }
 
 std::string bashCompletion(std::span<const Command* const> commands) {

@@ -11,7 +11,7 @@ namespace {
 
 /// Calls texel(x, y, frame) where there is a surface; the rest of the images is filled from there afterwards.
 template <class Texel>
-void forEachSurfaceTexel(const BakedScene& baked, std::size_t page, PageTexels& texels, Texel&& texel) {
+void forEachSurfaceTexel(const BakedScene& baked, std::size_t page, ChartTexels& texels, Texel&& texel) {
   const PageFrames frames = pageFrames(baked, page);
   for (int y = 0; y < texels.height; ++y)
     for (int x = 0; x < texels.width; ++x) {
@@ -57,10 +57,10 @@ std::optional<BandMaps> bandsOf(const BakedScene& baked, std::size_t page) {
 }
 
 std::array<Image, 4> godotLayers(const BandMaps& bands, const BakedScene& baked, std::size_t page,
-                                 const PageTexels& texels) {
+                                 const ChartTexels& texels) {
   std::array<Image, 4> layers;
   layers.fill(Image(texels.width, texels.height, 3, 0.5f));
-  PageTexels known = texels;
+  ChartTexels known = texels;
   forEachSurfaceTexel(baked, page, known, [&](int x, int y, const Frame& frame) {
     const Vec3 constant = glm::max(bands.maps[0].rgb(x, y), Vec3(0.0f));
     const Vec3 along[3] = {bands.maps[1].rgb(x, y), bands.maps[2].rgb(x, y), bands.maps[3].rgb(x, y)};
@@ -75,15 +75,15 @@ std::array<Image, 4> godotLayers(const BandMaps& bands, const BakedScene& baked,
       layers[k + 1].setRgb(x, y, share);
     }
   });
-  const std::vector<PageTexels> levels = mipTexels(std::move(known));
+  const std::vector<ChartTexels> levels = mipTexels(std::move(known));
   for (Image& layer : layers) layer = mipImages(layer, levels).front();
   return layers;
 }
 
-Image unityDirections(const BandMaps& bands, const BakedScene& baked, std::size_t page, const PageTexels& texels) {
+Image unityDirections(const BandMaps& bands, const BakedScene& baked, std::size_t page, const ChartTexels& texels) {
   const auto dominant = findEncoding("dominant", {});
   Image directions(texels.width, texels.height, 4, 0.5f);
-  PageTexels known = texels;
+  ChartTexels known = texels;
   forEachSurfaceTexel(baked, page, known, [&](int x, int y, const Frame& frame) {
     const std::array<Vec3, 4> sh1 = {bands.maps[0].rgb(x, y), bands.maps[1].rgb(x, y), bands.maps[2].rgb(x, y),
                                      bands.maps[3].rgb(x, y)};

@@ -24,10 +24,10 @@ std::string bandEncoding(const nlohmann::ordered_json& bakeJson, const std::stri
 /// Four layers as Godot's directional lightmaps have them: L0, then for world y, z and x of c: c / (8 L0) + 1/2, from 0
 /// to 1. Its shader decodes L0 + 8 L0 sum (layer - 1/2) n. c is limited to 4 L0 in each coordinate.
 std::array<Image, 4> godotLayers(const BandMaps& bands, const BakedScene& baked, std::size_t page,
-                                 const PageTexels& texels);
+                                 const ChartTexels& texels);
 
 /// Unity's directional map: RGB the mean direction of light d in Unity's world (glTF's with x negated) as d / 2 + 1/2,
 /// alpha what d has along the surface's normal, likewise. Its shader decodes flat * (n.(RGB - 1/2) + 1/2) / alpha.
-Image unityDirections(const BandMaps& bands, const BakedScene& baked, std::size_t page, const PageTexels& texels);
+Image unityDirections(const BandMaps& bands, const BakedScene& baked, std::size_t page, const ChartTexels& texels);
 
 }  // namespace lumel

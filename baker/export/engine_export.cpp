@@ -87,7 +87,7 @@ Expected<Json> writeBevyVolumes(const EngineSource& source, ExportFolder& folder
           }
     if (const auto why = whyUnfit(TexelFormat::Rgb9e5, slices))
       return usageError("light volume " + std::to_string(number) + " holds " + *why + "; bake with a weaker light");
-    Texture texture{TexelFormat::Rgb9e5, nx, 2 * ny, 3 * nz, {encodeTexels(TexelFormat::Rgb9e5, slices)}, {}};
+    GpuTexture texture{TexelFormat::Rgb9e5, nx, 2 * ny, 3 * nz, {encodeTexels(TexelFormat::Rgb9e5, slices)}, {}};
     const std::string name = "volume-" + std::to_string(number) + ".ktx2";
     const std::vector<std::uint8_t> file = ktx2File(texture);
     if (auto done = folder.add(name, std::span<const std::uint8_t>(file)); !done) return done.error();
@@ -118,17 +118,15 @@ Expected<Json> writeUnityDirections(const EngineSource& source, ExportFolder& fo
   return rows;
 }
 
-Expected<Json> exportFor(const fs::path& bake, const EngineExportOptions& options, ExportFolder& folder,
-                         Progress& progress) {
+Expected<Json> exportFor(const fs::path& bake, const Json& bakeJson, const EngineExportOptions& options,
+                         ExportFolder& folder, Progress& progress) {
   const bool hasKtx2 = options.engine == Engine::Three || options.engine == Engine::Bevy;
   if (options.texels && !hasKtx2)
     return usageError(std::string("--texels: ") + nameOf(options.engine) + " takes its own; leave it out");
   if (options.engine == Engine::Three && options.texels == TexelFormat::Bc6h)
     return usageError("--texels bc6h: three's KTX2Loader does not read it; use half or rgb9e5");
-  const auto bakeJson = readBakeJson(bake);
-  if (!bakeJson) return bakeJson.error();
   const std::string file = (bake / "bake.json").string();
-  const auto baked = readBake(bake, {.encoding = encodingFor(options, *bakeJson, file),
+  const auto baked = readBake(bake, {.encoding = encodingFor(options, bakeJson, file),
                                      .flat = true,
                                      .aux = true,
                                      .volumes = options.engine == Engine::Bevy});
@@ -140,14 +138,14 @@ Expected<Json> exportFor(const fs::path& bake, const EngineExportOptions& option
                                         .godotNames = options.engine == Engine::Godot,
                                         .unitPlaces = options.engine == Engine::Bevy});
   if (!scene) return scene.error();
-  const EngineSource source{*baked, *bakeJson, *scene, pageTexels(*baked, dilatedRings(*bakeJson)), progress};
+  const EngineSource source{*baked, *scene, chartTexels(*baked, bakeJson), progress};
   Json description = {{"for", nameOf(options.engine)}};
   if (options.engine == Engine::Three) {
     description["encoding"] = describeEncoding(*baked->encoding);
     description["conventions"] = describeConventions(*baked->encoding);
   }
   const auto rows = options.engine == Engine::Godot ? writeGodot(source, folder)
-                                                    : exportMaps(*baked, *bakeJson, maps, folder, progress);
+                                                    : exportMaps(*baked, source.texels, maps, folder, progress);
   if (!rows) return rows.error();
   description["maps"] = *rows;
   if (options.engine == Engine::Unity) {

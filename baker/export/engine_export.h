@@ -24,9 +24,10 @@ struct EngineExportOptions {
 /// What is written: scene.glb, maps, tables, README.md.
 /// three: KTX2 of all maps, lumel-three.js. godot: lightmap.exr (and so on), its .import, lightmap.tres
 /// (LightmapGIData), level.tscn. bevy: KTX2 of flat maps, irradiance volumes. unity: half EXR of flat maps, directional
-/// PNG, LumelLightmaps.cs. Formats and units: README.md of this folder. Returns the description for export.json.
-/// Errors: Usage, Input, Failed, Interrupted.
-Expected<nlohmann::ordered_json> exportFor(const std::filesystem::path& bake, const EngineExportOptions& options,
-                                           ExportFolder& folder, Progress& progress);
+/// PNG, LumelLightmaps.cs. Formats and units: README.md of this folder. `bakeJson`: that of `bake`. Returns the
+/// description for export.json. Errors: Usage, Input, Failed, Interrupted.
+Expected<nlohmann::ordered_json> exportFor(const std::filesystem::path& bake, const nlohmann::ordered_json& bakeJson,
+                                           const EngineExportOptions& options, ExportFolder& folder,
+                                           Progress& progress);
 
 }  // namespace lumel

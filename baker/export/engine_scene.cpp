@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 #include <span>
+#include <stdexcept>
 #include <utility>
 
 #include "scene/files/file_access.h"
@@ -25,6 +26,10 @@ std::uint32_t wordAt(std::span<const std::uint8_t> bytes, std::size_t at) {
 }
 void putWord(std::vector<std::uint8_t>& bytes, std::size_t word) {
   for (int shift = 0; shift < 32; shift += 8) bytes.push_back(static_cast<std::uint8_t>(word >> shift));
+}
+
+Error notOurs(const std::filesystem::path& file) {
+  return inputError(file.string() + ": not a scene.glb that lumel wrote; bake again");
 }
 
 Json* lumelOf(Json& object) {
@@ -176,12 +181,14 @@ class Editor {
   }
 
   std::vector<Vec2> readUvs(std::size_t index) const {
-    const Json& accessor = scene_.glb.json["accessors"][index];
-    const Json& view = scene_.glb.json["bufferViews"][accessor["bufferView"].get<std::size_t>()];
-    std::vector<Vec2> uvs(accessor["count"].get<std::size_t>());
+    const Json& accessor = scene_.glb.json.at("accessors").at(index);
+    const Json& view = scene_.glb.json.at("bufferViews").at(accessor.at("bufferView").get<std::size_t>());
+    const auto count = accessor.at("count").get<std::size_t>();
     const std::size_t start = view.value("byteOffset", std::size_t{0}) + accessor.value("byteOffset", std::size_t{0});
-    if (start + uvs.size() * sizeof(Vec2) <= scene_.glb.binary.size())
-      std::memcpy(uvs.data(), scene_.glb.binary.data() + start, uvs.size() * sizeof(Vec2));
+    const std::size_t size = scene_.glb.binary.size();
+    if (start > size || count > (size - start) / sizeof(Vec2)) throw std::out_of_range("UVs beyond the buffer");
+    std::vector<Vec2> uvs(count);
+    std::memcpy(uvs.data(), scene_.glb.binary.data() + start, count * sizeof(Vec2));
     return uvs;
   }
 
@@ -243,17 +250,16 @@ class Editor {
 Expected<Glb> Glb::read(const std::filesystem::path& file) {
   const auto bytes = readFile(file);
   if (!bytes) return bytes.error();
-  const auto wrong = [&file] { return inputError(file.string() + ": not a scene.glb that lumel wrote; bake again"); };
-  if (bytes->size() < 20 || wordAt(*bytes, 0) != kMagic || wordAt(*bytes, 16) != kJsonChunk) return wrong();
+  if (bytes->size() < 20 || wordAt(*bytes, 0) != kMagic || wordAt(*bytes, 16) != kJsonChunk) return notOurs(file);
   const std::size_t size = wordAt(*bytes, 12);
-  if (20 + size > bytes->size()) return wrong();
+  if (20 + size > bytes->size()) return notOurs(file);
   Glb glb;
   glb.json = Json::parse(bytes->begin() + 20, bytes->begin() + 20 + static_cast<std::ptrdiff_t>(size), nullptr, false);
-  if (!glb.json.is_object()) return wrong();
+  if (!glb.json.is_object()) return notOurs(file);
   const std::size_t binary = 20 + size;
   if (binary + 8 <= bytes->size() && wordAt(*bytes, binary + 4) == kBinaryChunk) {
     const std::size_t length = wordAt(*bytes, binary);
-    if (binary + 8 + length > bytes->size()) return wrong();
+    if (binary + 8 + length > bytes->size()) return notOurs(file);
     glb.binary.assign(bytes->begin() + static_cast<std::ptrdiff_t>(binary + 8),
                       bytes->begin() + static_cast<std::ptrdiff_t>(binary + 8 + length));
   }
@@ -286,7 +292,9 @@ Expected<EngineScene> engineScene(const std::filesystem::path& dir, const Engine
   try {
     return Editor(*std::move(glb), options).run();
   } catch (const Json::exception&) {
-    return inputError((dir / "scene.glb").string() + ": not a scene.glb that lumel wrote; bake again");
+    return notOurs(dir / "scene.glb");
+  } catch (const std::out_of_range&) {
+    return notOurs(dir / "scene.glb");
   }
 }
 

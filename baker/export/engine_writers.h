@@ -13,9 +13,8 @@ namespace lumel {
 /// What all of them write from.
 struct EngineSource {
   const BakedScene& baked;  // with flat maps, aux and volumes; its encoding is the one that the engine reads
-  const nlohmann::ordered_json& bakeJson;
   const EngineScene& scene;
-  std::vector<PageTexels> texels;
+  std::vector<ChartTexels> texels;
   Progress& progress;
 };
 

@@ -53,12 +53,6 @@ Expected<void> ExportFolder::add(const std::string& name, std::span<const std::u
   return add(name, std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
 }
 
-Expected<void> ExportFolder::add(const std::string& name, std::span<const std::vector<std::uint8_t>> pieces) {
-  const auto file = place(name);
-  if (!file) return file.error();
-  return writeBytes(*file, pieces);
-}
-
 Expected<void> ExportFolder::add(const std::string& name, const Image& image, const WriteImageOptions& options) {
   const auto file = place(name);
   if (!file) return file.error();

@@ -25,14 +25,14 @@ class ExportFolder {
 
   Expected<void> add(const std::string& name, std::string_view text);
   Expected<void> add(const std::string& name, std::span<const std::uint8_t> bytes);
-  Expected<void> add(const std::string& name, std::span<const std::vector<std::uint8_t>> pieces);
   Expected<void> add(const std::string& name, const Image& image, const WriteImageOptions& options);
 
   /// Adds export.json with `description` and the names of all files, and puts everything in place. Files that an
   /// earlier export.json of the folder lists, and this one does not have, are removed. Errors: Failed.
   Expected<void> commit(nlohmann::ordered_json description);
 
-  std::size_t fileCount() const { return names_.size() + 1; }
+  /// Files so far; export.json counts once it is there.
+  std::size_t fileCount() const { return names_.size(); }
 
  private:
   Expected<PendingFile> place(const std::string& name);

@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "baker/export/page_geometry.h"
 #include "baker/files/names/conventions.h"
 #include "baker/files/names/file_names.h"
 #include "baker/files/names/version.h"
-#include "lightmap/formats/half_float.h"
 #include "lightmap/formats/rgbm.h"
 #include "lightmap/formats/texture_files.h"
 
@@ -60,7 +58,7 @@ float largestValue(const BakedScene& baked, bool flatAlone) {
 }
 
 /// How far what was written is from the bake, over texels with a surface.
-Json differenceOf(const Image& written, const Image& map, const Image& flat, const PageTexels& texels) {
+Json differenceOf(const Image& written, const Image& map, const Image& flat, const ChartTexels& texels) {
   double squares = 0, sum = 0, reference = 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < texels.weights.size(); ++i) {
@@ -96,7 +94,7 @@ class MapWriter {
     if (!(range_ > 0.0f)) range_ = 1.0f;
   }
 
-  Expected<Json> write(std::size_t page, const PageMap& map, std::span<const PageTexels> levels) {
+  Expected<Json> write(std::size_t page, const PageMap& map, std::span<const ChartTexels> levels) {
     std::string name = pageFileName(page, map.name);
     name.replace(name.rfind('.'), std::string::npos, extensionOf(options_.container));
     const std::vector<Image> images = mipImages(*map.image, levels);
@@ -119,8 +117,8 @@ class MapWriter {
   }
 
   Expected<void> writeTexture(const std::string& name, const PageMap& map, std::span<const Image> images,
-                              std::span<const PageTexels> texels, Json& row, Image& seen) {
-    Texture texture{options_.texels, map.image->width, map.image->height, 1, {}, metadataOf(baked_, map.name)};
+                              std::span<const ChartTexels> texels, Json& row, Image& seen) {
+    GpuTexture texture{options_.texels, map.image->width, map.image->height, 1, {}, metadataOf(baked_, map.name)};
     if (map.isSigned && texture.format == TexelFormat::Bc6h) texture.format = TexelFormat::Bc6hSigned;
     std::size_t bytes = 0;
     for (std::size_t level = 0; level < (options_.mips ? images.size() : 1); ++level) {
@@ -141,6 +139,8 @@ class MapWriter {
   }
 
   Expected<void> writeRgbm(const std::string& name, const PageMap& map, const Image& image, Json& row, Image& seen) {
+    if (!std::ranges::all_of(image.pixels, [](float v) { return std::isfinite(v); }))
+      return unfit(name, "a value that is not finite");
     const float most = *std::max_element(image.pixels.begin(), image.pixels.end());
     if (most > range_)
       return usageError(name + ": the map holds " + std::to_string(most) + ", more than --rgbm-range " +
@@ -160,8 +160,7 @@ class MapWriter {
 
   Expected<void> writeHalf(const std::string& name, const PageMap& map, const Image& image, Json& row, Image& seen) {
     if (const auto why = whyUnfit(TexelFormat::Half, image)) return unfit(name, *why);
-    seen = image;
-    for (float& v : seen.pixels) v = floatFromHalf(halfFromFloat(v));
+    seen = decodeTexels(TexelFormat::Half, encodeTexels(TexelFormat::Half, image), image.width, image.height);
     row["texels"] = "half";
     WriteImageOptions options;
     options.format = PixelFormat::Half;
@@ -177,12 +176,6 @@ class MapWriter {
 
 }  // namespace
 
-int dilatedRings(const Json& bakeJson) {
-  const Json settings = bakeJson.value("settings", Json::object());
-  const Json rings = settings.is_object() ? settings.value("dilate", Json()) : Json();
-  return rings.is_number_integer() ? std::clamp(rings.get<int>(), 0, 1024) : 0;
-}
-
 Expected<void> checkFits(const Encoding& encoding, const MapExportOptions& options) {
   if (!encoding.isSigned() || options.flatAlone) return {};
   const bool isUnsigned = options.container == MapContainer::PngRgbm ||
@@ -193,17 +186,16 @@ Expected<void> checkFits(const Encoding& encoding, const MapExportOptions& optio
                     " cannot hold; use --texels bc6h or half with --format ktx2 or dds, or --flat-only");
 }
 
-Expected<Json> exportMaps(const BakedScene& baked, const Json& bakeJson, const MapExportOptions& options,
+Expected<Json> exportMaps(const BakedScene& baked, std::span<const ChartTexels> texels, const MapExportOptions& options,
                           ExportFolder& folder, Progress& progress) {
   if (auto done = checkFits(*baked.encoding, options); !done) return done.error();
   MapWriter writer(baked, options, folder);
-  const std::vector<PageTexels> pages = pageTexels(baked, dilatedRings(bakeJson));
   std::size_t count = 0;
-  for (std::size_t page = 0; page < pages.size(); ++page) count += mapsOf(baked, page, options.flatAlone).size();
+  for (std::size_t page = 0; page < texels.size(); ++page) count += mapsOf(baked, page, options.flatAlone).size();
   progress.begin("export", count);
   Json rows = Json::array();
-  for (std::size_t page = 0; page < pages.size(); ++page) {
-    const std::vector<PageTexels> levels = mipTexels(pages[page]);
+  for (std::size_t page = 0; page < texels.size(); ++page) {
+    const std::vector<ChartTexels> levels = mipTexels(texels[page]);
     for (const PageMap& map : mapsOf(baked, page, options.flatAlone)) {
       if (progress.cancelled()) return interrupted();
       auto row = writer.write(page, map, levels);

@@ -3,10 +3,12 @@
 
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "baker/export/export_folder.h"
 #include "baker/files/read/baked_scene.h"
+#include "lightmap/formats/chart_mips.h"
 #include "lightmap/formats/texel_format.h"
 #include "scene/base/progress.h"
 
@@ -22,17 +24,15 @@ struct MapExportOptions {
   bool flatAlone = false;                  // leave out the encoding's own maps
 };
 
-/// By how many texels the bake's maps were dilated, as bake.json states it.
-int dilatedRings(const nlohmann::ordered_json& bakeJson);
-
 /// Whether the encoding's maps can be written so. Errors: Usage, naming what to do instead.
 Expected<void> checkFits(const Encoding& encoding, const MapExportOptions& options);
 
-/// Writes every page's maps and the flat one as lightmap-<page>-<map>.<extension>. `baked` has flat maps and aux.
+/// Writes every page's maps and the flat one as lightmap-<page>-<map>.<extension>. `baked` has flat maps; `texels` are
+/// those of its pages (chartTexels).
 /// Returns the description of the maps: for each its file, page, map, format, size in bytes, levels, and how far it is
 /// from the bake over covered texels (root mean square of the difference and difference of the means, both over the
 /// flat map's mean). Errors: Usage (a value that the format does not hold), Failed, Interrupted.
-Expected<nlohmann::ordered_json> exportMaps(const BakedScene& baked, const nlohmann::ordered_json& bakeJson,
+Expected<nlohmann::ordered_json> exportMaps(const BakedScene& baked, std::span<const ChartTexels> texels,
                                             const MapExportOptions& options, ExportFolder& folder, Progress& progress);
 
 }  // namespace lumel

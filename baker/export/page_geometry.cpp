@@ -118,15 +118,25 @@ Frame frameAt(const Instance& instance, const Primitive& primitive, std::size_t 
 
 }  // namespace
 
-std::vector<PageTexels> pageTexels(const BakedScene& baked, int rings) {
+/// By how many texels the bake's maps were dilated.
+static int dilatedRings(const nlohmann::ordered_json& bakeJson) {
+  const auto settings = bakeJson.find("settings");
+  if (settings == bakeJson.end() || !settings->is_object()) return 0;
+  const auto rings = settings->find("dilate");
+  if (rings == settings->end() || !rings->is_number_integer()) return 0;
+  return static_cast<int>(std::clamp<std::int64_t>(rings->get<std::int64_t>(), 0, 1024));
+}
+
+std::vector<ChartTexels> chartTexels(const BakedScene& baked, const nlohmann::ordered_json& bakeJson) {
+  const int rings = dilatedRings(bakeJson);
   const auto channelOf = [&](const char* name) {
     return static_cast<std::size_t>(std::ranges::find(baked.auxChannels, name) - baked.auxChannels.begin());
   };
   const std::size_t coverage = channelOf("coverage"), validity = channelOf("validity");
-  std::vector<PageTexels> pages;
+  std::vector<ChartTexels> pages;
   for (std::size_t page = 0; page < baked.aux.size(); ++page) {
     const Image& aux = baked.aux[page];
-    PageTexels texels{aux.width, aux.height, chartsOnPage(baked, page, aux.width, aux.height), {}, {}};
+    ChartTexels texels{aux.width, aux.height, chartsOnPage(baked, page, aux.width, aux.height), {}, {}};
     texels.weights.resize(texels.charts.size());
     for (std::size_t i = 0; i < texels.charts.size(); ++i) {
       const float* values = aux.pixels.data() + i * static_cast<std::size_t>(aux.channels);

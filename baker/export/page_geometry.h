@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "baker/files/read/baked_scene.h"
@@ -12,9 +13,9 @@
 namespace lumel {
 
 /// Charts and coverage of each page. Triangles of an object whose corners have the same lightmap UVs are of one chart.
-/// A texel counts by its coverage (channel coverage of aux), and next to nothing where it is not valid. `rings`: by how
-/// many texels maps were dilated; these are kept, too. `baked` has aux images.
-std::vector<PageTexels> pageTexels(const BakedScene& baked, int rings);
+/// A texel counts by its coverage (channel coverage of aux), and next to nothing where it is not valid. Texels that
+/// maps were dilated to, by bakeJson, are kept, too. `baked` has aux images.
+std::vector<ChartTexels> chartTexels(const BakedScene& baked, const nlohmann::ordered_json& bakeJson);
 
 /// Frames in the world by texel, row by row; only where `isKnown`.
 struct PageFrames {

@@ -61,7 +61,7 @@ void PictureScene::collectShapes() {
   int charts = 0;
   for (const Instance& instance : baked_->scene.instances)
     for (const Primitive& primitive : baked_->scene.meshes[toSize(instance.mesh)].primitives) {
-      Shape shape;
+      PictureShape shape;
       shape.primitive = &primitive;
       shape.material = &baked_->scene.materials[toSize(primitive.material)];
       shape.number = number++;
@@ -92,7 +92,7 @@ void PictureScene::decodeTextures() {
     if (ref && std::find(wanted.begin(), wanted.end(), std::make_pair(ref.image, space)) == wanted.end())
       wanted.emplace_back(ref.image, space);
   };
-  for (const Shape& shape : shapes_) {
+  for (const PictureShape& shape : shapes_) {
     const Material& m = *shape.material;
     want(m.baseColorMap, ColorSpace::Srgb);
     want(m.normalMap, ColorSpace::Linear);
@@ -126,7 +126,7 @@ Expected<void> PictureScene::buildRays() {
   device_ = std::move(*made);
   rays_ = newEmbreeScene(device_.get());
   for (std::size_t i = 0; i < shapes_.size(); ++i) {
-    const Shape& shape = shapes_[i];
+    const PictureShape& shape = shapes_[i];
     EmbreeGeometry geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
     // Copies: Embree reads 16 bytes from the last vertex, which a shared buffer of three floats does not have.
     void* vertices = rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3),

@@ -18,7 +18,7 @@
 namespace lumel {
 
 /// One primitive of one instance, in world space.
-struct Shape {
+struct PictureShape {
   const Primitive* primitive = nullptr;
   const Material* material = nullptr;
   int number = 0;
@@ -33,7 +33,7 @@ struct Shape {
 
 /// A point on a shape: which triangle and where in it.
 struct PictureHit {
-  const Shape* shape = nullptr;
+  const PictureShape* shape = nullptr;
   std::uint32_t triangle = 0;
   std::array<std::uint32_t, 3> vertices{};
   Vec3 weights{0, 0, 0};
@@ -89,7 +89,7 @@ class PictureScene {
   static void filter(const RTCFilterFunctionNArguments* arguments);
 
   const BakedScene* baked_;
-  std::vector<Shape> shapes_;  // by Embree's geometry number
+  std::vector<PictureShape> shapes_;  // by Embree's geometry number
   std::map<std::pair<int, ColorSpace>, TexturePyramid> textures_;
   std::vector<std::string> warnings_;
   Vec3 least_{0, 0, 0};

@@ -2,7 +2,7 @@
 
 #include <cstdlib>
 
-#include "lightmap/formats/half_float.h"
+#include "scene/base/half.h"
 
 namespace lumel::bc6h {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "lightmap/formats/bc6h.h"
-#include "lightmap/formats/half_float.h"
+#include "scene/base/half.h"
 
 namespace lumel::bc6h {
 namespace {

@@ -15,7 +15,7 @@ std::size_t indexOf(int width, int x, int y) {
 /// Calls visit(index) for the texels of the finer level under one of the coarser. With an odd number of columns or rows
 /// the last coarse texel has three of them.
 template <class Visit>
-void forEachChild(const PageTexels& fine, const PageTexels& coarse, int x, int y, Visit&& visit) {
+void forEachChild(const ChartTexels& fine, const ChartTexels& coarse, int x, int y, Visit&& visit) {
   const int lastX = x + 1 == coarse.width ? fine.width : 2 * x + 2;
   const int lastY = y + 1 == coarse.height ? fine.height : 2 * y + 2;
   for (int cy = 2 * y; cy < lastY; ++cy)
@@ -28,7 +28,7 @@ struct Owner {
   float weight = 0.0f;
   int children = 0;
 };
-Owner ownerOf(const PageTexels& fine, const PageTexels& coarse, int x, int y) {
+Owner ownerOf(const ChartTexels& fine, const ChartTexels& coarse, int x, int y) {
   std::array<Owner, 9> owners{};
   int children = 0;
   forEachChild(fine, coarse, x, y, [&](std::size_t i) {
@@ -45,8 +45,8 @@ Owner ownerOf(const PageTexels& fine, const PageTexels& coarse, int x, int y) {
   return most;
 }
 
-PageTexels coarserOf(const PageTexels& fine) {
-  PageTexels coarse{std::max(1, fine.width / 2), std::max(1, fine.height / 2), {}, {}, {}};
+ChartTexels coarserOf(const ChartTexels& fine) {
+  ChartTexels coarse{std::max(1, fine.width / 2), std::max(1, fine.height / 2), {}, {}, {}};
   const std::size_t count = static_cast<std::size_t>(coarse.width) * static_cast<std::size_t>(coarse.height);
   coarse.charts.resize(count);
   coarse.weights.resize(count);
@@ -62,7 +62,7 @@ PageTexels coarserOf(const PageTexels& fine) {
   return coarse;
 }
 
-Image coarserImage(const Image& map, const PageTexels& fine, const PageTexels& coarse) {
+Image coarserImage(const Image& map, const ChartTexels& fine, const ChartTexels& coarse) {
   Image image(coarse.width, coarse.height, map.channels);
   const auto channels = static_cast<std::size_t>(map.channels);
   for (int y = 0; y < coarse.height; ++y)
@@ -84,7 +84,7 @@ Image coarserImage(const Image& map, const PageTexels& fine, const PageTexels& c
 
 /// Fills texels that are not kept: one ring from their neighbours, which bilinear lookups read, the rest from the
 /// coarser level, which is full.
-void fill(Image& image, const PageTexels& level, const Image* coarser) {
+void fill(Image& image, const ChartTexels& level, const Image* coarser) {
   TexelMask mask{image.width, image.height, level.kept};
   dilate(image, mask, 1);
   if (!coarser) return;
@@ -98,14 +98,14 @@ void fill(Image& image, const PageTexels& level, const Image* coarser) {
 
 }  // namespace
 
-std::vector<PageTexels> mipTexels(PageTexels page) {
-  std::vector<PageTexels> levels;
+std::vector<ChartTexels> mipTexels(ChartTexels page) {
+  std::vector<ChartTexels> levels;
   levels.push_back(std::move(page));
   while (levels.back().width > 1 || levels.back().height > 1) levels.push_back(coarserOf(levels.back()));
   return levels;
 }
 
-std::vector<Image> mipImages(const Image& map, std::span<const PageTexels> levels) {
+std::vector<Image> mipImages(const Image& map, std::span<const ChartTexels> levels) {
   std::vector<Image> images = {map};
   for (std::size_t i = 1; i < levels.size(); ++i)
     images.push_back(coarserImage(images.back(), levels[i - 1], levels[i]));

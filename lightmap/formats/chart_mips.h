@@ -13,7 +13,7 @@
 namespace lumel {
 
 /// What lies where on a level of a page, row by row.
-struct PageTexels {
+struct ChartTexels {
   int width = 0;
   int height = 0;
   std::vector<std::uint32_t> charts;  // 0: none
@@ -22,9 +22,9 @@ struct PageTexels {
 };
 
 /// The page itself and its coarser levels down to one texel, each half as wide and high, rounded down.
-std::vector<PageTexels> mipTexels(PageTexels page);
+std::vector<ChartTexels> mipTexels(ChartTexels page);
 
 /// The levels of one of the page's maps, the finest as it is but for texels that are not kept, which are filled.
-std::vector<Image> mipImages(const Image& map, std::span<const PageTexels> levels);
+std::vector<Image> mipImages(const Image& map, std::span<const ChartTexels> levels);
 
 }  // namespace lumel

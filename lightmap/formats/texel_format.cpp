@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "lightmap/formats/bc6h.h"
-#include "lightmap/formats/half_float.h"
 #include "lightmap/formats/rgb9e5.h"
+#include "scene/base/half.h"
 #include "scene/base/parallel.h"
 
 namespace lumel {

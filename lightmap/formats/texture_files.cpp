@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <span>
+
+#include "scene/base/check.h"
+#include "scene/images/dds_file.h"
 
 namespace lumel {
 namespace {
@@ -94,7 +98,7 @@ void putKeyValues(Bytes& out, const std::map<std::string, std::string>& metadata
 
 }  // namespace
 
-std::vector<std::uint8_t> ktx2File(const Texture& texture) {
+std::vector<std::uint8_t> ktx2File(const GpuTexture& texture) {
   constexpr std::array<std::uint8_t, 12> kIdentifier = {0xAB, 'K',  'T',  'X',  ' ',  '2',
                                                         '0',  0xBB, '\r', '\n', 0x1A, '\n'};
   const TexelFormatTraits& traits = traitsOf(texture.format);
@@ -135,38 +139,19 @@ std::vector<std::uint8_t> ktx2File(const Texture& texture) {
   return std::move(out.data);
 }
 
-std::vector<std::uint8_t> ddsFile(const Texture& texture) {
-  constexpr std::uint32_t kCaps = 0x1, kHeight = 0x2, kWidth = 0x4, kPitch = 0x8, kPixelFormat = 0x1000,
-                          kMipCount = 0x20000, kLinearSize = 0x80000, kDepth = 0x800000;
-  constexpr std::uint32_t kFourCc = 0x4, kDx10 = 0x30315844;  // "DX10"
-  constexpr std::uint32_t kComplex = 0x8, kTextureCaps = 0x1000, kMipMap = 0x400000, kVolume = 0x200000;
+std::vector<std::uint8_t> ddsFile(const GpuTexture& texture) {
+  LUMEL_CHECK(texture.depth == 1);
   const TexelFormatTraits& traits = traitsOf(texture.format);
-  const bool is3d = texture.depth > 1, hasMips = texture.levels.size() > 1, isBlocks = traits.blockSide > 1;
-  Bytes out;
-  out.word(0x20534444);  // "DDS "
-  out.word(124);
-  out.word(kCaps | kHeight | kWidth | kPixelFormat | (isBlocks ? kLinearSize : kPitch) | (hasMips ? kMipCount : 0) |
-           (is3d ? kDepth : 0));
-  out.word(static_cast<std::uint32_t>(texture.height));
-  out.word(static_cast<std::uint32_t>(texture.width));
-  out.word(static_cast<std::uint32_t>(byteCount(texture.format, texture.width, isBlocks ? texture.height : 1)));
-  out.word(is3d ? static_cast<std::uint32_t>(texture.depth) : 0);
-  out.word(static_cast<std::uint32_t>(texture.levels.size()));
-  for (int i = 0; i < 11; ++i) out.word(0);
-  out.word(32);  // the pixel format's size
-  out.word(kFourCc);
-  out.word(kDx10);
-  for (int i = 0; i < 5; ++i) out.word(0);
-  out.word(kTextureCaps | (hasMips ? kComplex | kMipMap : 0) | (is3d ? kComplex : 0));
-  out.word(is3d ? kVolume : 0);
-  for (int i = 0; i < 3; ++i) out.word(0);
-  out.word(static_cast<std::uint32_t>(traits.dxgiFormat));
-  out.word(is3d ? 4 : 3);  // dimensions, as Direct3D 10 counts them
-  out.word(0);
-  out.word(1);  // one texture
-  out.word(0);
-  for (const std::vector<std::uint8_t>& level : texture.levels) out.append(level);
-  return std::move(out.data);
+  const bool isBlocks = traits.blockSide > 1;
+  std::vector<std::uint8_t> file =
+      ddsHeaderBytes({.width = texture.width,
+                      .height = texture.height,
+                      .levels = texture.levels.size(),
+                      .isBlocks = isBlocks,
+                      .firstBytes = byteCount(texture.format, texture.width, isBlocks ? texture.height : 1),
+                      .dxgiFormat = static_cast<std::uint32_t>(traits.dxgiFormat)});
+  for (const std::vector<std::uint8_t>& level : texture.levels) file.insert(file.end(), level.begin(), level.end());
+  return file;
 }
 
 }  // namespace lumel

@@ -10,7 +10,7 @@
 
 namespace lumel {
 
-struct Texture {
+struct GpuTexture {
   TexelFormat format = TexelFormat::Half;
   int width = 0;
   int height = 0;
@@ -22,8 +22,8 @@ struct Texture {
 
 /// A file's bytes. KTX 2.0 (Khronos, sections 3 and 4) with its Data Format Descriptor, orientation "rd" (u right, v
 /// down), levels from the coarsest on.
-std::vector<std::uint8_t> ktx2File(const Texture& texture);
-/// DDS with the header of Direct3D 10, which names formats by DXGI_FORMAT.
-std::vector<std::uint8_t> ddsFile(const Texture& texture);
+std::vector<std::uint8_t> ktx2File(const GpuTexture& texture);
+/// DDS with the header of Direct3D 10, which names formats by DXGI_FORMAT. Precondition: depth 1.
+std::vector<std::uint8_t> ddsFile(const GpuTexture& texture);
 
 }  // namespace lumel

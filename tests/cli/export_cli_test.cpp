@@ -63,7 +63,8 @@ TEST(Export, BlocksOfBc6hReadByOpenImageIoAreNearToTheBake) {
     const LoadedImage seen = mustRead(dir / "dds" / ("lightmap-0-" + std::string(map) + ".dds"));
     ASSERT_EQ(seen.image.width, 256);
     const Difference difference = differenceOf(baked.image, seen.image, aux);
-    // What is asked for of BC6H at 8 bits a texel; the maps of rnm have harder edges, and it falls with the page's size.
+    // What is asked for of BC6H at 8 bits a texel; the maps of rnm have harder edges, and it falls with the page's
+    // size.
     EXPECT_LT(difference.rms, std::string(map) == "flat" ? 0.008 : 0.01) << map;
     EXPECT_NEAR(difference.ratio, 1.0, 1e-4) << map;
     // What export.json states is what another reader finds. It is over the flat map's mean.
@@ -151,6 +152,21 @@ TEST(Export, MistakesAreOneLineAndTheBakeIsSafe) {
   const Outcome encoding = run({"export", dir / "bake", "-o", dir / "out", "--encoding", "zh3"});
   EXPECT_EQ(encoding.exitCode, 3);
   EXPECT_TRUE(mentions(encoding.err, "holds rnm and not zh3"));
+  // What would say nothing is refused.
+  for (const std::vector<std::string>& idle : {std::vector<std::string>{"--format", "exr-half", "--texels", "bc6h"},
+                                               {"--format", "png-rgbm", "--no-mips"},
+                                               {"--rgbm-range", "8"},
+                                               {"--flat-only", "--encoding", "rnm"},
+                                               {"--for", "bevy", "--encoding", "rnm"},
+                                               {"--for", "three", "--format", "dds"},
+                                               {"--for", "godot", "--texels", "half"},
+                                               {"--keep-lights"}}) {
+    std::vector<std::string> arguments = {"export", dir / "bake", "-o", dir / "out"};
+    arguments.insert(arguments.end(), idle.begin(), idle.end());
+    const Outcome refused = run(arguments);
+    EXPECT_EQ(refused.exitCode, 2) << idle[0];
+    EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
+  }
   EXPECT_EQ(readFolder(dir / "bake"), before);
   EXPECT_FALSE(fs::exists(dir / "out"));
   // Equal bytes for any number of threads.

@@ -8,10 +8,10 @@
 
 #include "lightmap/formats/bc6h.h"
 #include "lightmap/formats/chart_mips.h"
-#include "lightmap/formats/half_float.h"
 #include "lightmap/formats/rgb9e5.h"
 #include "lightmap/formats/rgbm.h"
 #include "lightmap/formats/texture_files.h"
+#include "scene/base/half.h"
 #include "tests/mentions.h"
 
 namespace lumel {
@@ -192,8 +192,8 @@ TEST(TexelFormats, ImagesOfAnySizeComeBack) {
 }
 
 /// Two charts side by side on a page of 8 x 4: columns 0 to 2 hold 1, columns 3 to 5 hold 100, the rest nothing.
-PageTexels twoCharts() {
-  PageTexels page{8, 4, {}, {}, {}};
+ChartTexels twoCharts() {
+  ChartTexels page{8, 4, {}, {}, {}};
   for (int y = 0; y < 4; ++y)
     for (int x = 0; x < 8; ++x) {
       page.charts.push_back(x < 3 ? 1 : x < 6 ? 2 : 0);
@@ -204,7 +204,7 @@ PageTexels twoCharts() {
 }
 
 TEST(ChartMips, NoTexelMixesCharts) {
-  const PageTexels page = twoCharts();
+  const ChartTexels page = twoCharts();
   Image map(8, 4, 3);
   for (int y = 0; y < 4; ++y)
     for (int x = 0; x < 6; ++x) map.setRgb(x, y, Vec3(x < 3 ? 1.0f : 100.0f));
@@ -223,13 +223,13 @@ TEST(ChartMips, NoTexelMixesCharts) {
 }
 
 TEST(ChartMips, TexelsCountByTheirCoverage) {
-  PageTexels page{2, 2, {1, 1, 1, 1}, {1.0f, 0.5f, 0.25f, 0.25f}, {1, 1, 1, 1}};
+  ChartTexels page{2, 2, {1, 1, 1, 1}, {1.0f, 0.5f, 0.25f, 0.25f}, {1, 1, 1, 1}};
   Image map(2, 2, 3);
   for (int i = 0; i < 4; ++i) map.setRgb(i % 2, i / 2, Vec3(static_cast<float>(i)));
   const auto images = mipImages(map, mipTexels(page));
   EXPECT_FLOAT_EQ(images[1].pixels[0], (0.0f + 0.5f + 0.5f + 0.75f) / 2.0f);
   // Odd sizes: nothing is lost at the rim.
-  PageTexels odd{3, 1, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}};
+  ChartTexels odd{3, 1, {1, 1, 1}, {1, 1, 1}, {1, 1, 1}};
   Image row(3, 1, 3);
   row.setRgb(2, 0, Vec3(3.0f));
   EXPECT_FLOAT_EQ(mipImages(row, mipTexels(odd))[1].pixels[0], 1.0f);
@@ -242,7 +242,7 @@ std::uint32_t wordAt(const std::vector<std::uint8_t>& bytes, std::size_t at) {
 
 TEST(TextureFiles, Ktx2SaysWhereItsLevelsAre) {
   for (const TexelFormat format : {TexelFormat::Half, TexelFormat::Rgb9e5, TexelFormat::Bc6h}) {
-    Texture texture{format, 8, 4, 1, {}, {{"lumel:map", "flat"}}};
+    GpuTexture texture{format, 8, 4, 1, {}, {{"lumel:map", "flat"}}};
     for (const auto& [width, height] : {std::pair(8, 4), std::pair(4, 2), std::pair(2, 1), std::pair(1, 1)})
       texture.levels.emplace_back(byteCount(format, width, height), static_cast<std::uint8_t>(width));
     const auto file = ktx2File(texture);

@@ -11,7 +11,8 @@ import { LinearFilter, NoColorSpace, ShaderChunk } from 'three';
 
 const MAP_NAMES = { flat: ['flat'], rnm: ['rnm0', 'rnm1', 'rnm2'] };
 
-// Radiosity normal mapping, squared weights: see "decodeFormula" in export.json. The normal map's texel is read again,
+// Radiosity normal mapping, squared weights, or plain ones for maps of signed projection: see "decodeFormula" in
+// export.json. The normal map's texel is read again,
 // since three has turned it into view space by then.
 const RNM_PARS = /* glsl */ `
 uniform sampler2D lumelRnm1;
@@ -20,8 +21,12 @@ vec3 lumelDecode( vec3 n, vec3 map0, vec3 map1, vec3 map2 ) {
   vec3 w = vec3( dot( n, vec3( 0.8164966, 0.0, 0.5773503 ) ), dot( n, vec3( -0.4082483, 0.7071068, 0.5773503 ) ),
                  dot( n, vec3( -0.4082483, -0.7071068, 0.5773503 ) ) );
   w = max( w, vec3( 0.0 ) );
-  w *= w;
-  return ( w.x * map0 + w.y * map1 + w.z * map2 ) / max( w.x + w.y + w.z, 1e-6 );
+  #ifdef LUMEL_SIGNED
+    return max( w.x * map0 + w.y * map1 + w.z * map2, vec3( 0.0 ) );
+  #else
+    w *= w;
+    return ( w.x * map0 + w.y * map1 + w.z * map2 ) / max( w.x + w.y + w.z, 1e-6 );
+  #endif
 }
 `;
 const RNM_TEXEL = /* glsl */ `
@@ -35,7 +40,7 @@ const RNM_TEXEL = /* glsl */ `
       texture2D( lumelRnm1, vLightMapUv ).rgb, texture2D( lumelRnm2, vLightMapUv ).rgb ), 1.0 );
 `;
 
-function useRnm(material, maps) {
+function useRnm(material, maps, isSigned) {
   material.onBeforeCompile = (shader) => {
     shader.uniforms.lumelRnm1 = { value: maps[1] };
     shader.uniforms.lumelRnm2 = { value: maps[2] };
@@ -43,10 +48,10 @@ function useRnm(material, maps) {
       /vec4 lightMapTexel = texture2D\( lightMap, vLightMapUv \);/, RNM_TEXEL);
     if (lights === ShaderChunk.lights_fragment_maps) throw new Error('lumel: this version of three samples lightmaps otherwise');
     shader.fragmentShader = shader.fragmentShader
-      .replace('void main() {', RNM_PARS + 'void main() {')
+      .replace('void main() {', (isSigned ? '#define LUMEL_SIGNED\n' : '') + RNM_PARS + 'void main() {')
       .replace('#include <lights_fragment_maps>', lights);
   };
-  material.customProgramCacheKey = () => 'lumel-rnm';
+  material.customProgramCacheKey = () => (isSigned ? 'lumel-rnm-signed' : 'lumel-rnm');
 }
 
 /** The textures of an object: those of its page, read through its rectangle. */
@@ -87,7 +92,7 @@ export async function loadLumel(folder, { gltfLoader, ktx2Loader, mode = 'flat' 
     const material = object.material.clone();
     material.lightMap = maps[0];
     material.lightMapIntensity = Math.PI;
-    if (mode === 'rnm') useRnm(material, maps);
+    if (mode === 'rnm') useRnm(material, maps, about.conventions.projection === 'signed');
     object.material = material;
     lit.push(object);
   });
